@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 
 from pilotage.core.random import RandomStreams
 from pilotage.core.types import FloatArray, Pose2, Twist
+from pilotage.experiments.loop import simulate
 from pilotage.experiments.mission import mission_of, read_mission
 from pilotage.experiments.run import run_mission
 from pilotage.kernels.control.closing_in import drive_closes_in
@@ -135,6 +137,40 @@ def test_it_gives_way_ahead_and_may_drive_away_and_never_backs_blindly() -> None
     far = MovingBodies(MovingBodiesConfig(), ROBOT, CHART)
     _watch(far, (4.0, 0.0), (-1.0, 0.0))
     assert GiveWay(GiveWayConfig(), ROBOT, far).allows(Twist(0.5, 0.0), here, NOTHING)
+
+
+def test_who_has_mates_backs_where_it_looks_alone() -> None:
+    here, back = Pose2(0.0, 0.0, 0.0), Twist(-0.3, 0.0)
+
+    def allows(lidar: LidarConfig | None, mates: int) -> bool:
+        robot = replace(ROBOT, sensors={} if lidar is None else {"lidar": lidar})
+        bodies = MovingBodies(MovingBodiesConfig(), robot, CHART, mates=mates)
+        return GiveWay(GiveWayConfig(), robot, bodies).allows(back, here, NOTHING)
+
+    assert allows(LIDAR, 0)
+    assert not allows(LIDAR, 1)
+    assert allows(LidarConfig(field_of_view_rad=2.0 * math.pi), 1)
+    # Who minds nobody anywhere backs as well.
+    assert allows(None, 1)
+
+
+def test_nobody_backs_into_the_mate_that_followed_it() -> None:
+    """Three in a corridor to one place: the first stands there, the second cannot get past it."""
+    mission = read_mission("museum-1") | {
+        "robots": [{"name": f"r{k}", "start": {"x_m": 10.0 - 3.0 * k, "y_m": 0.8}} for k in range(3)]
+    }
+    walls = [[0.0, 0.0, 14.0, 0.0], [14.0, 0.0, 14.0, 1.6], [14.0, 1.6, 0.0, 1.6], [0.0, 1.6, 0.0, 0.0]]
+    settings = {
+        "world.map": {"map": "corridor", "walls_m": walls},
+        "world.start": None,
+        "world.goal": {"x_m": 12.5, "y_m": 0.8},
+        "world.obstacles": [],
+        "stack.localizer": {"name": "ekf-walls"},
+        "run.time_limit_s": 60.0,
+    }
+    robots = simulate(mission_of(mission, (), 1, settings)).finished.robots
+    assert not any(robot.collisions for robot in robots)
+    assert min(float(robot.trace["v_cmd_m_s"].min()) for robot in robots) >= 0.0
 
 
 def test_driving_past_is_no_driving_away() -> None:

@@ -101,6 +101,8 @@ class TaskKnowledge:
         Of the last goal's heading, where it has one; pi where any will do.
     time_limit_s
         When the run ends at the latest.
+    mates
+        How many other robots drive on the same floor.
     pose_given
         Tells the true pose, as a motion capture system would, to a robot that is given it; None as a rule.
     """
@@ -110,6 +112,7 @@ class TaskKnowledge:
     goal_tolerance_m: float = math.inf
     goal_tolerance_rad: float = math.pi
     time_limit_s: float = math.inf
+    mates: int = 0
     pose_given: Callable[[], Pose2] | None = None
 
     @property

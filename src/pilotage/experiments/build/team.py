@@ -108,6 +108,7 @@ def _member(
         goal_tolerance_m=min((place.tolerance_m for place in goals), default=np.inf),
         goal_tolerance_rad=goals[-1].tolerance_rad if goals else np.pi,
         time_limit_s=mission.run.time_limit_s,
+        mates=len(mission.members) - 1,
         pose_given=truth.tell_pose if "localizer" in oracles else None,
     )
     if "mapper" in oracles and config.map == "none":

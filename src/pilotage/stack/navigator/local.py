@@ -100,7 +100,9 @@ class LocalNavigator(LocalizingNavigator):
             DeadReckoningConfig(), robot, chart, task.initial, journal
         )
         super().__init__(localizer, journal)
-        self._bodies = MovingBodies(config.moving_bodies, robot, chart, unexplained=unexplained_of(parts))
+        self._bodies = MovingBodies(
+            config.moving_bodies, robot, chart, mates=task.mates, unexplained=unexplained_of(parts)
+        )
         self._gives_way = GiveWay(config.give_way, robot, self._bodies)
         self._make_room = MakeRoom(config.make_room, robot, chart.field, self._bodies)
         self._shut_in = config.shut_in_s, config.shut_in_m

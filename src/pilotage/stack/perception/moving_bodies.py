@@ -62,6 +62,7 @@ class MovingBodies:
 
     One that stands is left to the mapper; one that walks is nothing to be mapped but somebody to give way to,
     and so is, where people are about, one that is too new to tell.
+    Where a robot has mates one of them may be wherever its laser does not look, seen before or not.
     Idle where told to mind nobody, without exactly one lidar or known walls, or while the robot is lost.
     Groups wider than ``tracks.widest_m`` without a notch between two are left to the mapper.
     """
@@ -73,6 +74,7 @@ class MovingBodies:
         chart: WorldMap,
         *,
         minds: bool = True,
+        mates: int = 0,
         unexplained: UnexplainedReturns | None = None,
     ) -> None:
         self._config = config
@@ -80,6 +82,7 @@ class MovingBodies:
         lidars = list(robot.sensors_of(LidarConfig).items())
         walls = chart.walls
         self._works = minds and len(lidars) == 1 and len(walls.segments_m) + len(walls.circles_m) > 0
+        self._mates = mates
         self._walks: BoolArray = np.zeros(0, np.bool_)
         self._t_s = self.seen_s = -math.inf
         self._field = 0.0, 0.0
@@ -213,9 +216,11 @@ class MovingBodies:
 
     def may_be_at(self, bearing_rad: float) -> bool:
         """Whether somebody may be in a direction of the base's frame in which the laser does not look."""
+        if not self._works:
+            return False
         first, last = self._field
         sees = (bearing_rad - first) % (2.0 * math.pi) <= last - first
-        return not sees and self._t_s - self.seen_s < self._config.backs_after_s
+        return not sees and (self._mates > 0 or self._t_s - self.seen_s < self._config.backs_after_s)
 
     def discs_m(self) -> FloatArray:
         """(M, 3) where they are now, of their own size."""

@@ -98,6 +98,7 @@ class Context:
             robot,
             own_map.told,
             minds=parts.mapper is not None,
+            mates=task.mates,
             unexplained=unexplained_of(parts),
         )
         self._gives_way = GiveWay(config.give_way, robot, self._bodies)
@@ -179,6 +180,11 @@ class Context:
     def among_people(self) -> bool:
         """Whether somebody walked about a moment ago: what blocks the path may be gone soon."""
         return self._bodies.about
+
+    @property
+    def may_back(self) -> bool:
+        """Whether nobody can be behind it whom its laser does not see."""
+        return not self._bodies.may_be_at(math.pi)
 
     def meets_something_new(self, pose: Pose2) -> bool:
         """Whether something came into sight just now, near enough, that may be the first person it meets."""

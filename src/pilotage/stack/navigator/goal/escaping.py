@@ -120,7 +120,8 @@ def begin_escape(context: Context, resumes: State, pose: Pose2, why: str, waits:
     """Stop, and back out from the next step on; without an escape this is the end.
 
     Among people, and where the first one may have come along, it waits instead: a robot that backs out sees
-    nobody behind it. Having waited so often it makes room.
+    nobody behind it. Having waited so often it makes room. With a mate behind it, who may have followed
+    unseen, it turns on the spot and looks for a path from there.
     """
     if context.among_people and waits <= 0 and context.helps_to_make_room(pose):
         return make_room(context, resumes, f"{why}: making room, as somebody walks about")
@@ -131,8 +132,9 @@ def begin_escape(context: Context, resumes: State, pose: Pose2, why: str, waits:
     if context.escape is None:
         return fail(context, f"stuck: {why}, and the stack has no escape (stack.escape: back-out)")
     context.journal.count("escapes")
-    context.say("escape", f"{why}: backing out the way it came")
-    context.escape.begin(context.trail)
+    backs = context.may_back
+    context.say("escape", f"{why}: {'backing out the way it came' if backs else 'turning to look around'}")
+    context.escape.begin(context.trail if backs else [])
     context.follower.drop()
     context.mode = Mode.ESCAPE
     return Move(Escaping(context, resumes), STOP)
