@@ -160,7 +160,7 @@ def test_nobody_backs_into_the_mate_that_followed_it() -> None:
         "robots": [{"name": f"r{k}", "start": {"x_m": 10.0 - 3.0 * k, "y_m": 0.8}} for k in range(3)]
     }
     walls = [[0.0, 0.0, 14.0, 0.0], [14.0, 0.0, 14.0, 1.6], [14.0, 1.6, 0.0, 1.6], [0.0, 1.6, 0.0, 0.0]]
-    settings = {
+    settings: dict[str, Any] = {
         "world.map": {"map": "corridor", "walls_m": walls},
         "world.start": None,
         "world.goal": {"x_m": 12.5, "y_m": 0.8},
