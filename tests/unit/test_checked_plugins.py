@@ -33,7 +33,7 @@ from pilotage.stack.control.controller import CONTROLLERS, Control
 from pilotage.stack.control.escape import ESCAPES
 from pilotage.stack.control.local.role import LOCAL_CONTROLLERS
 from pilotage.stack.control.reactive import REACTIVES, Reaction, ReactionKind
-from pilotage.stack.interface import NAVIGATORS, Belief, BeliefStatus
+from pilotage.stack.interface import NAVIGATORS, Belief, BeliefStatus, StackStatus
 from pilotage.stack.localization.heading_filter import HEADING_FILTERS, HeadingEstimate
 from pilotage.stack.localization.localizer import LOCALIZERS
 from pilotage.stack.mapping.mapper import MAPPERS
@@ -195,11 +195,20 @@ def test_what_a_component_keeps_is_looked_at_with_what_it_gives() -> None:
     lost = Belief(Pose2(NAN, 0.0, 0.0), EYE, BeliefStatus.LOST)
     for role, gives, kept in (
         ("navigator", Twist(0.1, 0.0), {"belief": lost}),
+        ("navigator", Twist(0.1, 0.0), {"belief": belief(), "status": "arrived"}),
+        ("navigator", Twist(0.1, 0.0), {"belief": belief(), "status": ("arrived", "")}),
+        ("navigator", Twist(0.1, 0.0), {"belief": belief()}),
+        ("navigator", Twist(0.1, 0.0), {"status": (StackStatus.RUNNING, "")}),
         ("mapper", True, {"circles_m": np.zeros((2, 2))}),
         ("motion", None, {"moves": np.full((1, 3), NAN)}),
     ):
         with pytest.raises(InputError, match=f"{role} 'mine' of 'somebodys'"):
             made(role, gives, **kept)(*CALLED_WITH.get(role, ()))
+
+
+def test_a_navigator_that_says_how_far_it_is_drives() -> None:
+    kept = {"belief": belief(), "status": (StackStatus.RUNNING, "")}
+    assert made("navigator", Twist(0.1, 0.0), **kept)() == Twist(0.1, 0.0)
 
 
 def test_one_without_its_roles_method_is_refused_as_it_registers() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib
+import inspect
 import json
 import os
 import re
@@ -10,11 +12,13 @@ import sys
 import tomllib
 from collections import defaultdict
 from pathlib import Path
+from typing import get_args, get_type_hints
 
 import pytest
 
 from pilotage.cli.main import main
 from pilotage.core import plugins
+from pilotage.experiments.roles import ROLES
 
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "CONTRIBUTING.md").read_text()
@@ -93,6 +97,21 @@ def test_the_examples_run_from_outside(tmp_path: Path) -> None:
     done = run(tmp_path, FROM_OUTSIDE, *words, "--plugin", "wobble.py")
     assert check(done) >= 2.0
     assert json.loads(done.stdout)["wobble_rad"] > 0.0
+
+
+def test_the_table_of_roles_is_true() -> None:
+    """Every role but those of the worked examples, what it is built as and what its protocol has."""
+    row = r"^\| `(\w+)`.* \| `(\w+)` of `(\S+)\.py` \| `(.*?)` \| (.*) \|$"
+    rows = {key.removesuffix("s"): rest for key, *rest in re.findall(row, TEXT, re.MULTILINE)}
+    assert set(rows) == set(ROLES) - {"planner", "sensor", "motion", "task"}
+    for role, (registry, file, built, has) in rows.items():
+        module = importlib.import_module("pilotage." + file.replace("/", "."))
+        assert getattr(module, registry) is ROLES[role]
+        said = re.sub(r"(\w+): \w+", r"\1", " ".join(inspect.getsource(module).split()))
+        assert f"uilt as ``{built}``" in said, role
+        (protocol,) = get_args(get_type_hints(module)[registry])
+        public = {name for name in vars(protocol) | get_type_hints(protocol) if not name.startswith("_")}
+        assert set(re.findall(r"`(\w+)`", has)) - {"StackStatus"} == public, role
 
 
 @pytest.mark.parametrize("word", ["stroll", "beeline"])

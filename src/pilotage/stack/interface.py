@@ -9,7 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
-from pilotage.core.checked import Gives, misfit
+from pilotage.core.checked import Gives, misfit, told
 from pilotage.core.registry import Registry
 from pilotage.core.scan_update import LineVerdict as LineVerdict
 from pilotage.core.scan_update import ScanUpdate as ScanUpdate
@@ -115,7 +115,10 @@ class Stack(Protocol):
 
 
 def _unfit(given: object, stack: Stack, *_: object) -> str:
-    return misfit(given, (Twist, WheelSpeeds)) or misfit(stack.belief, Belief)
+    status = getattr(stack, "status", None)
+    pair = isinstance(status, tuple) and [type(part) for part in status] == [StackStatus, str]
+    wrong = misfit(given, (Twist, WheelSpeeds)) or misfit(getattr(stack, "belief", None), Belief)
+    return wrong or ("" if pair else f"status {told(status)}")
 
 
 NAVIGATORS: Registry[Stack] = Registry(
@@ -123,7 +126,13 @@ NAVIGATORS: Registry[Stack] = Registry(
     "pilotage.stack.navigator",
     "pilotage.stack.exploration",
     "pilotage.replicas",
-    gives=(Gives("step", "a Twist or WheelSpeeds, and a Belief, of finite numbers", _unfit),),
+    gives=(
+        Gives(
+            "step",
+            "a Twist or WheelSpeeds and a Belief of finite numbers, and as status a StackStatus and why",
+            _unfit,
+        ),
+    ),
 )
 """Whole stacks; built as ``cls(config, robot, chart, task, parts, journal)``: a ``RobotKnowledge``, a
 ``WorldMap``, a ``TaskKnowledge``, the ``Parts`` that the mission names, and the ``Journal`` to write into.
