@@ -9,19 +9,26 @@ import numpy as np
 import pytest
 
 from pilotage.core.errors import InputError
+from pilotage.core.random import RandomStreams
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.experiments.build.build import build
 from pilotage.experiments.loop import run_loop
 from pilotage.experiments.mission import load_mission
 from pilotage.kernels.scans.rays import narrow_fan
 from pilotage.maps.segment_map import SegmentMap
+from pilotage.maps.world_map import WorldMap
 from pilotage.missions.mission import Mission
+from pilotage.models.footprint import Footprint
+from pilotage.models.motion.differential_drive import DifferentialDriveConfig
 from pilotage.sensors.joint_lidar import joint_lidar, places_of_lasers_m
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, Readings
 from pilotage.sensors.sensor import Mount, SensorConfig
+from pilotage.stack.interface import Belief
+from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.localization.scan_fit import ScanFit
-from pilotage.stack.perception.joint_scan import JointScan
+from pilotage.stack.mapping.obstacle_layer import ObstacleLayer, ObstacleLayerConfig
+from pilotage.stack.perception.joint_scan import JointScan, with_joint_lidar
 
 TWO = """
 extends: {mission}
@@ -193,6 +200,39 @@ def test_what_a_wall_hides_from_between_the_lasers_speaks_against_nobody() -> No
     assert known.explained > 0.95
     elsewhere = np.array([1.5, 0.05, 0.2])
     assert ScanFit(walls, join.sheet, 20.0, 0.1, 0.3, eyes_m).of(elsewhere, ranges_m).explained < 0.3
+
+
+@pytest.mark.parametrize(("looks_rad", "kept"), [(4.0, True), (5.0, False)])
+def test_a_mapper_keeps_what_no_laser_looks_at(looks_rad: float, kept: bool) -> None:
+    """A post beside the body was mapped as the robot came up to it; its lasers look ahead and behind. From
+    between them beams pass over it to a wall that both see."""
+    hall = np.array(
+        [[-9.0, -3.0, 9.0, -3.0], [9.0, -3.0, 9.0, 3.0], [9.0, 3.0, -9.0, 3.0], [-9.0, 3.0, -9.0, -3.0]]
+    )
+    chart = WorldMap("hall", (-9.0, -3.0, 9.0, 3.0), SegmentMap.of(hall, np.zeros((0, 3))))
+    post, nothing = np.array([[0.0, 0.9, 0.05]]), np.zeros((0, 3))
+    sensors: dict[str, SensorConfig] = {
+        "front": LidarConfig(beams=195, field_of_view_rad=looks_rad, mount=Mount(x_m=0.9)),
+        "back": LidarConfig(beams=195, field_of_view_rad=looks_rad, mount=Mount(x_m=-0.9, theta_rad=math.pi)),
+    }
+    told, join = with_joint_lidar(
+        RobotKnowledge(
+            Footprint.disc(0.3), DifferentialDriveConfig(), sensors, 0.1, RandomStreams(0, "robot")
+        )
+    )
+    assert join is not None
+    layer = ObstacleLayer(ObstacleLayerConfig(), told, chart)
+
+    def look(pose: Pose2, posts: FloatArray) -> None:
+        scans = {name: LidarScan(seen(sheet, pose, hall, posts)) for name, sheet in sensors.items()}
+        layer.step(join.add(Readings(0.0, scans)), Belief(pose, 1e-6 * np.eye(3)))
+
+    for _ in range(4):
+        look(Pose2(-2.0, 0.0, 0.0), post)
+    assert len(layer.circles_m)
+    for _ in range(4):
+        look(Pose2(0.0, 0.0, 0.0), post if kept else nothing)
+    assert bool(len(layer.circles_m)) == kept
 
 
 def test_beams_of_which_nothing_is_known_are_not_unexplained() -> None:

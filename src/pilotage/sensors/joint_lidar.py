@@ -66,12 +66,18 @@ def joint_lidar(sensors: Mapping[str, SensorConfig], where: str = "robot.sensors
     )
 
 
+def lasers_of(sheet: LidarConfig, sensors: Mapping[str, SensorConfig]) -> list[tuple[str, LidarConfig]]:
+    """The lasers that a sheet joins, by name; none of a single laser."""
+    joined = sheet.of if isinstance(sheet, JointLidarConfig) else ()
+    found = ((name, sensors[name]) for name in joined)
+    return [(name, config) for name, config in found if isinstance(config, LidarConfig)]
+
+
 def places_of_lasers_m(sheet: LidarConfig, sensors: Mapping[str, SensorConfig]) -> FloatArray:
     """(V, 2) of the lasers that a sheet joins, in the frame of its scan; none of a single laser."""
-    if not isinstance(sheet, JointLidarConfig):
-        return np.zeros((0, 2))
     middle = sheet.mount.pose.inverse()
-    return np.array([middle.compose(sensors[name].mount.pose).as_array()[:2] for name in sheet.of])
+    places = [middle.compose(config.mount.pose).as_array()[:2] for _, config in lasers_of(sheet, sensors)]
+    return np.array(places).reshape(-1, 2)
 
 
 def _arc(sheets: list[LidarConfig]) -> tuple[float, float]:

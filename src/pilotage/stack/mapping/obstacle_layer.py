@@ -8,10 +8,11 @@ import numpy as np
 from pydantic import Field
 
 from pilotage.core.config import Config
-from pilotage.core.types import FloatArray, IntArray, Pose2
+from pilotage.core.types import BoolArray, FloatArray, IntArray, Pose2
 from pilotage.kernels.scans import unexpected
 from pilotage.maps.memory import require_memory
 from pilotage.maps.world_map import WorldMap
+from pilotage.sensors.joint_lidar import lasers_of
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, Readings
 from pilotage.sensors.sensor import Positive
@@ -55,6 +56,7 @@ class ObstacleLayer:
         self._config = config
         self._lidar, lidar = robot.one_sensor(LidarConfig, "obstacle-layer")
         self._step = lidar.beam_step_rad
+        self._lasers = lasers_of(lidar, robot.sensors)
         self._reach_m = min(config.reach_m, lidar.max_range_m)
         self.unexplained = UnexplainedReturns(lidar, chart, config.tolerance_m, config.sigmas)
         self.unexplained.look_to(config.reach_m)
@@ -76,7 +78,7 @@ class ObstacleLayer:
             return False
         config, seen = self._config, self.unexplained.of(scan, belief)
         if config.forget_scans and len(self.circles_m):
-            self._forget(scan.ranges_m, seen, belief.pose)
+            self._forget(scan.ranges_m, seen, belief.pose, self._looked_through(readings, seen, belief.pose))
         if seen.points_m.shape[0] == 0:
             return False
         means = unexpected.confirm_cells(
@@ -97,13 +99,39 @@ class ObstacleLayer:
         self._passed = np.append(self._passed, np.zeros(len(discs), dtype=np.int64))
         return True
 
-    def _forget(self, ranges_m: FloatArray, seen: Unexplained, pose: Pose2) -> None:
+    def _looked_through(self, readings: Readings, seen: Unexplained, pose: Pose2) -> BoolArray:
+        """Which discs (M,) one of several lasers saw through itself; all, where the scan is of one.
+
+        From between them a beam passes places where none of them looks.
+        """
+        looked = np.full(len(self.circles_m), not self._lasers)
+        for name, sheet in self._lasers:
+            scan = readings.by_sensor.get(name)
+            if isinstance(scan, LidarScan):
+                at = pose.compose(sheet.mount.pose)
+                looked |= unexpected.seen_through(
+                    self.circles_m,
+                    scan.ranges_m,
+                    at.x_m,
+                    at.y_m,
+                    at.theta_rad + float(sheet.beam_angles_rad()[0]),
+                    sheet.beam_step_rad,
+                    sheet.max_range_m,
+                    self._config.forget_beyond_m,
+                    seen.spread_m,
+                    seen.spread_rad,
+                    sheet.max_range_m,
+                )
+        return looked
+
+    def _forget(self, ranges_m: FloatArray, seen: Unexplained, pose: Pose2, looked: BoolArray) -> None:
         """Take off the map what has been seen through often enough; it may be found there again."""
         config = self._config
         # Where the robot stands nothing else does: somebody stood there.
         gone, some = unexpected.gone_discs(
             self.circles_m,
             self._passed,
+            looked,
             ranges_m,
             seen.x_m,
             seen.y_m,
