@@ -211,20 +211,18 @@ def test_a_mapper_keeps_what_no_laser_looks_at(looks_rad: float, kept: bool) -> 
     )
     chart = WorldMap("hall", (-9.0, -3.0, 9.0, 3.0), SegmentMap.of(hall, np.zeros((0, 3))))
     post, nothing = np.array([[0.0, 0.9, 0.05]]), np.zeros((0, 3))
-    sensors: dict[str, SensorConfig] = {
+    lasers = {
         "front": LidarConfig(beams=195, field_of_view_rad=looks_rad, mount=Mount(x_m=0.9)),
         "back": LidarConfig(beams=195, field_of_view_rad=looks_rad, mount=Mount(x_m=-0.9, theta_rad=math.pi)),
     }
     told, join = with_joint_lidar(
-        RobotKnowledge(
-            Footprint.disc(0.3), DifferentialDriveConfig(), sensors, 0.1, RandomStreams(0, "robot")
-        )
+        RobotKnowledge(Footprint.disc(0.3), DifferentialDriveConfig(), lasers, 0.1, RandomStreams(0, "robot"))
     )
     assert join is not None
     layer = ObstacleLayer(ObstacleLayerConfig(), told, chart)
 
     def look(pose: Pose2, posts: FloatArray) -> None:
-        scans = {name: LidarScan(seen(sheet, pose, hall, posts)) for name, sheet in sensors.items()}
+        scans = {name: LidarScan(seen(sheet, pose, hall, posts)) for name, sheet in lasers.items()}
         layer.step(join.add(Readings(0.0, scans)), Belief(pose, 1e-6 * np.eye(3)))
 
     for _ in range(4):
