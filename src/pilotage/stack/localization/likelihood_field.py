@@ -24,6 +24,8 @@ INDEPENDENT_SHARE = 0.25
 ALIKE_M, TURN_AS_PATH_M, LEAST_MOVE_M = 3.0, 0.5, 0.03
 """Path over which the cells in sight, and so their errors, become others; a turn of one radian counts as so
 much path, and who stands still as one who moves a little: people and noise differ from scan to scan."""
+STANDS_M = 0.001
+"""Who moved less since the last scan stands."""
 AT_WALL_STDS = 3
 """A beam so near to a wall ends at it."""
 TABLE_PER_STD, TABLE_STDS = 50, 12
@@ -59,9 +61,10 @@ class LikelihoodField:
         field_std_m: float | None,
         random_share: float,
         reach_m: float,
+        joint: bool = False,
     ) -> None:
         on_cells = chart.geometry is None and chart.grid is not None
-        self._on_cells = on_cells
+        self._on_cells, self._joint = on_cells, joint
         self.independent_share = INDEPENDENT_SHARE if on_cells else 1.0
         half_m, least_std_m, walls = 0.0, WALL_STD_M, chart.walls
         if on_cells and chart.grid is not None:
@@ -115,14 +118,16 @@ class LikelihoodField:
     def kept(self, moved_m: float, turned_rad: float) -> float:
         """Share of what a filter knows that stays beside a scan taken after a move; 0: the two simply add up.
 
-        A grid's errors are the same from scan to scan while the same cells are in sight, so scans are no
-        independent witnesses. What is known already and what the scan says are joined as if nobody knew how
-        much of both is the same: ``known^kept scan^(1 - kept)`` (covariance intersection: Julier and Uhlmann
-        1997; for densities Hurley 2002). No number of scans from one place then tells more than one of them.
+        A grid's errors are the same from scan to scan while the same cells are in sight, and for who stands so
+        are those of several lasers' joint scan, whose beams lie between theirs: such scans are no independent
+        witnesses. What is known already and what the scan says are joined as if nobody knew how much of both
+        is the same: ``known^kept scan^(1 - kept)`` (covariance intersection: Julier and Uhlmann 1997; for
+        densities Hurley 2002). No number of scans from one place then tells more than one of them.
         """
-        if not self._on_cells:
+        path_m = moved_m + TURN_AS_PATH_M * turned_rad
+        if not self._on_cells and not (self._joint and path_m < STANDS_M):
             return 0.0
-        return math.exp(-max(moved_m + TURN_AS_PATH_M * turned_rad, LEAST_MOVE_M) / ALIKE_M)
+        return math.exp(-max(path_m, LEAST_MOVE_M) / ALIKE_M)
 
     def mapped(self, points: FloatArray, pose: FloatArray) -> FloatArray:
         """Those of a scan's end points (K, 2) that lie where the map says anything, as seen from a pose (3,).

@@ -17,6 +17,7 @@ from pilotage.core.types import FloatArray, Pose2
 from pilotage.kernels.filters import particles
 from pilotage.maps.world_map import WorldMap
 from pilotage.models.odometry import OdometryModel
+from pilotage.sensors.joint_lidar import JointLidarConfig
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, OdometryIncrement, Readings
 from pilotage.sensors.sensor import NonNegative, Positive
@@ -151,6 +152,7 @@ class ParticleFilterLocalizer:
             else math.sqrt(config.measurement_var_scale) * config.field_std_m,
             random_share=config.random_share,
             reach_m=lidar.max_range_m,
+            joint=isinstance(lidar, JointLidarConfig),
         )
         self._relocalization = Relocalization(self._field, chart.bounds_m) if config.relocalize else None
         self._picked = np.unique(np.linspace(0, lidar.beams - 1, min(config.beams, lidar.beams)).astype(int))
