@@ -174,7 +174,7 @@ def test_whoever_asks_for_the_scan_takes_both(tmp_path: Path, base: str, more: t
 
 
 def test_who_stands_is_not_ever_surer_of_what_beams_between_the_lasers_are_off_by(tmp_path: Path) -> None:
-    """Its standard deviation fell below a tenth of its error within half a minute at rest, which is 0.5 mm."""
+    """Its standard deviation fell to a tenth of its error, half a millimetre, within half a minute."""
     stands = "stack.navigator={name: open-loop, program: [{duration_s: 4, speed_m_s: 0.5}, {duration_s: 25}]}"
     words = ("stack.localizer={name: particle-filter}", stands, "task=drive", "world.goal=null")
     mission = mission_of(tmp_path, "museum-walls", *words, "stack.planner=null", "run.time_limit_s=30")
