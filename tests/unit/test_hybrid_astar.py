@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from pilotage.kernels.rrt.dubins import advance
 from pilotage.kernels.rrt.reeds_shepp import follow, shortest, word_length
 from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.segment_map import SegmentMap
+from pilotage.models.footprint import Footprint
 from pilotage.stack.planning.hybrid_astar import HybridAstarConfig, HybridAstarPlanner
 from pilotage.stack.planning.outline import car_of, ground_of
 from pilotage.stack.planning.planner import PlanStatus
@@ -221,3 +223,20 @@ def test_where_greed_finds_nothing_patience_does() -> None:
     assert both.path is not None
     assert np.array_equal(both.path.states, patient.path.states)
     assert both.iterations == patient.iterations + 2
+
+
+def test_where_all_cells_were_looked_at_in_vain_smaller_ones_find_a_path() -> None:
+    """Through a door 7 cm wider on either side than the outline, 1 cm more than it keeps."""
+    walls = [[0.0, 0.0, 8.0, 0.0], [8.0, 0.0, 8.0, 5.0], [8.0, 5.0, 0.0, 5.0], [0.0, 5.0, 0.0, 0.0]]
+    door = [[4.0, 0.0, 4.0, 2.13], [4.0, 2.87, 4.0, 5.0]]
+    world = SegmentMap(np.array([*walls, *door]), np.zeros((0, 3)), (0.0, 0.0, 8.0, 5.0))
+    long = Footprint.polygon(np.array([[0.9, 0.3], [-0.3, 0.3], [-0.3, -0.3], [0.9, -0.3]]))
+    ask = request(world, Pose2(1.5, 1.0, 1.57), Goal(6.5, 4.0, 1.57))
+    ask = replace(ask, footprint=long, least_turning_radius_m=0.5)
+    found = HybridAstarPlanner(HybridAstarConfig(cell_m=0.2)).plan(ask)
+    assert found.path is not None, found.reason
+    corners = np.ascontiguousarray(long.points_m)
+    for x, y, theta in found.path.states:
+        c, s = math.cos(theta), math.sin(theta)
+        around = corners, long.radius_m, world.segments_m, world.circles_m
+        assert outline_clearance(x, y, c, s, *around) > 0.0

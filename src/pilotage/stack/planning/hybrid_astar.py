@@ -30,6 +30,10 @@ LEAST_RADIUS_M = 0.3
 """Of who turns on the spot: tighter arcs would be driven slowly."""
 
 
+FINER = 0.5
+"""Side of the cells, over that of those that were all looked at in vain, for one more search."""
+
+
 class HybridAstarConfig(Config):
     """Prices, resolution, and what is kept from obstacles beside the outline itself."""
 
@@ -109,12 +113,18 @@ class HybridAstarPlanner:
         nodes: FloatArray,
         parents: FloatArray,
     ) -> tuple[int, int, FloatArray, int]:
-        """As ``hybrid.search``: greedily for a while, and where that finds nothing with patience."""
+        """As ``hybrid.search``: greedily for a while, where that finds nothing with patience, and where that
+        has no cell left, some of which it entered badly, greedily once more among cells of half the side."""
         config = self._config
         first = int(config.greedy_share * config.most_expansions) if config.greed > 1.0 else 0
-        step_m, expanded = max(config.step_m, 1.5 * config.cell_m), 0
-        for greed, most in ((config.greed, first), (1.0, config.most_expansions)):
-            if most == 0:
+        step_m, expanded, ended = max(config.step_m, 1.5 * config.cell_m), 0, hybrid.NO_PATH
+        for greed, most, cell_m in (
+            (config.greed, first, config.cell_m),
+            (1.0, config.most_expansions, config.cell_m),
+            (config.greed, config.most_expansions, FINER * config.cell_m),
+        ):
+            looked_at_all = ended == hybrid.NO_PATH
+            if most == 0 or (cell_m < config.cell_m and not looked_at_all):
                 continue
             prices = hybrid.Prices(config.reverse_cost, config.switch_cost_m, config.turn_cost, greed)
             ended, last, word, count = hybrid.search(
@@ -125,7 +135,7 @@ class HybridAstarPlanner:
                 prices,
                 bound,
                 step_m,
-                config.cell_m,
+                cell_m,
                 config.headings,
                 most,
                 nodes,
