@@ -173,14 +173,19 @@ def test_whoever_asks_for_the_scan_takes_both(tmp_path: Path, base: str, more: t
     assert np.hypot(trace["est_x_m"] - trace["true_x_m"], trace["est_y_m"] - trace["true_y_m"])[-1] < 0.02
 
 
-def test_who_stands_is_not_ever_surer_of_what_beams_between_the_lasers_are_off_by(tmp_path: Path) -> None:
+@pytest.mark.parametrize("localizer", ["particle-filter", "ekf-walls"])
+def test_who_stands_is_not_ever_surer_of_what_beams_between_the_lasers_are_off_by(
+    localizer: str, tmp_path: Path
+) -> None:
     """Its standard deviation fell to a tenth of its error, half a millimetre, within half a minute."""
     stands = "stack.navigator={name: open-loop, program: [{duration_s: 4, speed_m_s: 0.5}, {duration_s: 25}]}"
-    words = ("stack.localizer={name: particle-filter}", stands, "task=drive", "world.goal=null")
+    words = (f"stack.localizer={{name: {localizer}}}", stands, "task=drive", "world.goal=null")
     mission = mission_of(tmp_path, "museum-walls", *words, "stack.planner=null", "run.time_limit_s=30")
     robot = run_loop(build(mission)).finished.robots[0]
     off = nees(poses(robot.trace, "true"), poses(robot.trace, "est"), covariances(robot.trace))
     assert off[-50:].mean() < 8.0
+    spread = np.sqrt(robot.trace["cov_xx_m2"] + robot.trace["cov_yy_m2"])
+    assert spread[-1] > 0.7 * spread[50]
 
 
 def test_lasers_that_scan_at_other_times_are_refused(tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.maps.world_map import WorldMap
 from pilotage.models.odometry import OdometryModel
+from pilotage.sensors.joint_lidar import JointLidarConfig
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, OdometryIncrement, Readings
 from pilotage.sensors.sensor import Positive
@@ -47,6 +48,11 @@ MOST_REFUSED = 0.25
 """Share of the lines beside walls; those of a right belief are refused in one of a thousand cases."""
 LEAST_BY_NOISE = 0.5
 """Of the lines that its noise lets through: all of a scan are refused that do not agree."""
+
+
+MOST_ALIKE, STANDS_M, TURN_AS_PATH_M = 5, 0.001, 0.5
+"""So many joint scans of several lasers count where the robot stands, moved less than this since the last
+one: beams between the lasers are off by the same in each. A turn of one radian counts as so much path."""
 
 
 class EkfWallsConfig(Config):
@@ -105,6 +111,7 @@ class EkfWallsLocalizer:
         self._extractor = LineExtractor(config.lines, lidar, range_var, robot.streams.stream("ekf-walls"))
         # Only the covariances are scaled: which points make a line is no matter of belief.
         self._var_scale = config.measurement_var_scale
+        self._joint, self._moved_m, self._alike = isinstance(lidar, JointLidarConfig), 0.0, 0
         self._mount = np.array([lidar.mount.x_m, lidar.mount.y_m, lidar.mount.theta_rad])
         self._matcher = WallMatcher(config.matching, config.gate, chart.walls, self._mount)
         if config.recovery is None:
@@ -174,6 +181,8 @@ class EkfWallsLocalizer:
         return self._blind or self._check.lost(self._t_s)
 
     def _move(self, odometry: OdometryIncrement) -> None:
+        driven_m = math.hypot(odometry.distance_m, odometry.lateral_m)
+        self._moved_m += driven_m + TURN_AS_PATH_M * abs(odometry.angle_rad)
         if not self._lost:
             self._prediction.move(self._pose, self._cov, odometry)
         elif self._recovery is not None:
@@ -186,10 +195,18 @@ class EkfWallsLocalizer:
         self._journal.update = WallUpdate(pose, cov, self._pose.copy(), lines, matches, self._matcher)
         # Lines beside no wall at all are of what is on no map; those that may be several walls say nothing.
         count = matches.count
+        if self._tells_nothing_new(count):
+            self._pose, self._cov = pose.copy(), cov.copy()
         self._check.tell(self._t_s, matches.placed, count, total, self._expected_nis[count])
         if self._recovery is not None:
             self._lost = self._recovery.gives_up(self._pose, self._cov, ranges_m, matches)
         return count, total
+
+    def _tells_nothing_new(self, matched: int) -> bool:
+        """Whether a scan is one too many of several lasers from where the robot stands."""
+        stands, self._moved_m = self._moved_m < STANDS_M, 0.0
+        self._alike = self._alike + (matched > 0) if stands else 0
+        return self._joint and self._alike > MOST_ALIKE
 
     def _find(self, lines: DetectedLines, ranges_m: FloatArray) -> None:
         assert self._recovery is not None, "never lost without it"
