@@ -27,7 +27,7 @@ from pilotage.core.files.arrays import map_npy, read_npy, read_npz, require_numb
 from pilotage.core.files.images import opened_image
 from pilotage.core.files.parquet import arrow_table, read_parquet
 from pilotage.core.json_text import load_json
-from pilotage.core.shown import shown, visible
+from pilotage.core.shown import LONGEST_TEXT, shown, visible
 from pilotage.core.yaml_text import load_yaml
 
 READERS = (read_bytes, read_text, read_yaml, read_json, require_file, map_npy, read_npz, read_parquet)
@@ -335,3 +335,12 @@ def test_what_is_shown_is_one_bounded_line_without_controls(text: str, most: int
     assert line.isprintable()
     assert len(line) <= most
     assert visible("a\nb\x1b", keep="\n") == "a\nb\\x1b"
+
+
+def test_the_end_of_a_long_line_is_kept() -> None:
+    """It says what is wrong, behind what was typed."""
+    for typed in ("0, " * 900, "0, " * 40_000):
+        line = shown(f"--set 'a=[{typed}]': expected a number, found a list")
+        assert line.startswith("--set 'a=[0, 0,")
+        assert line.endswith("expected a number, found a list")
+        assert len(line) <= LONGEST_TEXT

@@ -31,11 +31,16 @@ def visible(text: str, keep: str = "") -> str:
 
 
 def shown(text: str, most: int = LONGEST_TEXT) -> str:
-    """One line of bounded length: white space in a row is one blank, long words lose their middle."""
-    # Split first: the line ends of a message are blanks, not escapes. What is beyond is never looked at.
-    words = [_short(visible(word)) for word in text[: 20 * most].split()]
+    """One line of bounded length: white space in a row is one blank, long words and lines lose their middle.
+
+    A message begins with the place and ends with what is wrong there.
+    """
+    if len(text) > 20 * most:  # what is between is never looked at
+        text = f"{text[: 10 * most]} {text[-10 * most :]}"
+    # Split first: the line ends of a message are blanks, not escapes.
+    words = [_short(visible(word)) for word in text.split()]
     line = " ".join(words)
-    return line if len(line) <= most else line[: most - 3] + "..."
+    return line if len(line) <= most else f"{line[: most - most // 3 - 3]}...{line[-(most // 3) :]}"
 
 
 def _short(word: str) -> str:
