@@ -12,6 +12,8 @@ import socket
 import zlib
 from pathlib import Path
 
+from pilotage.core.whole_number import whole_number
+
 
 def draft_prefix(path: Path) -> str:
     """How names of this process's drafts of ``path`` begin."""
@@ -29,8 +31,8 @@ def clear_drafts(path: Path) -> None:
     except OSError:
         return
     for entry in found:
-        number = entry.name.removeprefix(begin).partition("-")[0]
-        if not number.isascii() or not number.isdigit() or is_alive(int(number)):
+        pid = whole_number(entry.name.removeprefix(begin).partition("-")[0])
+        if not pid or is_alive(pid):
             continue
         if entry.is_dir() and not entry.is_symlink():
             shutil.rmtree(entry, ignore_errors=True)
