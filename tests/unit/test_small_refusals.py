@@ -55,6 +55,8 @@ def test_missions(settings: list[str], words: str) -> None:
         ("museum-unknown", "stack.navigator.resolution_m=1e-9", "greater than or equal to 0.005"),
         # An arc that was followed without an end.
         ("museum-1-fast", "stack.local_controller={name: dwa, horizon_s: 1e9}", "less than or equal to 100"),
+        # Trees of twigs that go nowhere, for minutes.
+        ("museum-1", "stack.planner.max_connection_distance_m=1e-5", "greater than or equal to 0.1"),
         # 13 GB before it was refused, where there were so many.
         ("gale-pose", "world.map={name: crater, rows: 100000}", "expected at most 1,024 MB, found 12,600 MB"),
         # A run whose page could not be made of its own folder.

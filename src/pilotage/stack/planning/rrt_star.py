@@ -30,7 +30,7 @@ class RrtStarConfig(Config):
     What each says is told of ``rrt-star-dubins``.
     """
 
-    max_connection_distance_m: float = Field(1.5, gt=0.0, le=1000.0)
+    max_connection_distance_m: float = Field(1.5, ge=0.1, le=1000.0)
     goal_bias: float = Field(0.05, ge=0.0, le=1.0)
     guide_bias: float = Field(0.6, ge=0.0, le=0.95)
     guide_spread_m: float = Field(0.6, gt=0.0, le=100.0)
