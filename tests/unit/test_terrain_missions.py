@@ -53,9 +53,7 @@ def test_no_outlines_are_made_of_hazards_that_stop_nobody(name: str, monkeypatch
     """A crater's cells have a million sides: to make them was half of what a short run took."""
     monkeypatch.setattr("pilotage.maps.world_map.outlines", None)
     mission = load_mission(name, ["run.time_limit_s=3000", "world.map.columns=4400"])
-    path_m = run_mission(mission, save=False).metrics["path_length_m"]
-    assert isinstance(path_m, float)
-    assert path_m > 0.0
+    assert run_mission(mission, save=False).metrics["path_length_m"] != 0.0
 
 
 class TestTheRoversSecondTask:
