@@ -120,9 +120,10 @@ class LikelihoodField:
 
         A grid's errors are the same from scan to scan while the same cells are in sight; those of several
         lasers' joint scan, whose beams lie between theirs, while the robot stands. Such scans are no
-        independent witnesses. What is known already and what the scan says are joined as if nobody knew how much of both
-        is the same: ``known^kept scan^(1 - kept)`` (covariance intersection: Julier and Uhlmann 1997; for
-        densities Hurley 2002). No number of scans from one place then tells more than one of them.
+        independent witnesses. What is known already and what the scan says are joined as if nobody knew how
+        much of both is the same: ``known^kept scan^(1 - kept)`` (covariance intersection: Julier and
+        Uhlmann 1997; for densities Hurley 2002). No number of scans from one place then tells more than one
+        of them.
         """
         path_m = moved_m + TURN_AS_PATH_M * turned_rad
         if not self._on_cells and not (self._joint and path_m < STANDS_M):
