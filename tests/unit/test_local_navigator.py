@@ -53,6 +53,16 @@ class Jumping:
         return self.belief
 
 
+class Lost(Jumping):
+    """One that has given up its belief at the second and third step: it is in the middle of the map then."""
+
+    @property
+    def belief(self) -> Belief:
+        if self.steps in (2, 3):
+            return Belief.anywhere((0.0, 0.0, 16.0, 12.0))
+        return Belief(START, np.eye(3) * 1e-4)
+
+
 def navigator(noting: Noting, told: Told, localizer: Jumping | None = None) -> LocalNavigator:
     parts = Parts(localizer, None, None, None, None, None, None, None, noting)
     return told.navigator(LocalNavigator, LocalConfig(), parts)
@@ -94,6 +104,22 @@ def test_a_localizers_jump_moves_the_goal_not_the_pose() -> None:
     assert before.goal_xy_m == (8.0, 6.0)
     assert after.goal_xy_m == pytest.approx((8.0, 5.5))
     assert then.goal_xy_m == after.goal_xy_m
+
+
+def test_who_is_lost_stands_and_is_not_at_a_goal_in_the_middle_of_the_map() -> None:
+    """It drove on from there, and was at a goal that lies there."""
+    noting, told = Noting(), told_of(start=START)
+    stack = navigator(noting, told, Lost())
+    assert stack.step(readings(0.1, 0.1, 0.0)) == Twist(0.1, 0.0)
+    noting.status = "arrived"
+    for step in (2, 3):
+        assert stack.step(readings(0.1 * step, 0.0, 0.0)) == Twist(0.0, 0.0)
+        assert stack.status[0] is StackStatus.RUNNING
+        assert math.isnan(told.said["distance_to_go_m"])
+    noting.status = "driving"
+    assert stack.step(readings(0.4, 0.1, 0.0)) == Twist(0.2, 0.0)
+    assert len(noting.views) == 2
+    assert [event.kind for event in told.journal.events] == ["lost", "found"]
 
 
 def test_it_arrives_when_its_controller_says_so_and_stays() -> None:

@@ -15,7 +15,7 @@ from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.control.give_way import GiveWay, GiveWayConfig
 from pilotage.stack.control.local.drive import LocalDrive
 from pilotage.stack.control.make_room import MakeRoom, MakeRoomConfig
-from pilotage.stack.interface import NAVIGATORS, StackStatus
+from pilotage.stack.interface import NAVIGATORS, Belief, BeliefStatus, StackStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.localization.dead_reckoning import DeadReckoningConfig, DeadReckoningLocalizer
@@ -63,10 +63,11 @@ class LocalNavigator(LocalizingNavigator):
 
     The controller sees poses that are integrated from the odometry alone, which drift but do not jump.
     Where the goal has a heading it turns to it on the spot, if its corners have room there. Without a
-    localizer the belief is dead reckoned; with one the goal stays where the localizer has it. With a planner
-    the controller is led along its plan on the robot's own map, to which a mapper adds what it sees; without,
-    it heads for the goal itself, which fails where the way leads far around. Between two scans the last
-    command stands. Fails where the robot cannot turn on the spot: the controllers reckon with it.
+    localizer the belief is dead reckoned; with one the goal stays where the localizer has it. With a
+    planner the controller is led along its plan on the robot's own map, to which a mapper adds what it
+    sees; without, it heads for the goal itself, which fails where the way leads far around. Between two
+    scans the last command stands; while its localizer is lost, the robot. Fails where the robot cannot turn
+    on the spot: the controllers reckon with it.
     """
 
     def __init__(
@@ -107,7 +108,7 @@ class LocalNavigator(LocalizingNavigator):
         self._make_room = MakeRoom(config.make_room, robot, chart.field, self._bodies)
         self._shut_in = config.shut_in_s, config.shut_in_m
         self._stood: tuple[float, Pose2] | None = None
-        self._makes_room = False
+        self._makes_room = self._lost = False
         self._plan: PlanAhead | None = None
         if parts.planner is not None:
             self._plan = PlanAhead(
@@ -132,6 +133,10 @@ class LocalNavigator(LocalizingNavigator):
         pose = belief.pose
         self._drive.move(readings)
         away_m = math.hypot(self._goal_xy_m[0] - pose.x_m, self._goal_xy_m[1] - pose.y_m)
+        if self._is_lost(readings.t_s, belief):
+            # Where the goal is nobody knows: a belief that was given up lies in the middle of the map.
+            self._channel.tell(math.nan)
+            return STOP
         if self._status is not StackStatus.RUNNING:
             self._channel.tell(away_m)
             return STOP
@@ -157,6 +162,16 @@ class LocalNavigator(LocalizingNavigator):
         there = not (led or off_rad) and (abs(self._drive.rolls_m()) <= self._task.goal_tolerance_m)
         self._tell(readings.t_s, there=there)
         return STOP if self._status is not StackStatus.RUNNING else command
+
+    def _is_lost(self, t_s: float, belief: Belief) -> bool:
+        """Whether it does not know where it is any more; before its first plan the plan waits to know."""
+        knew = self._plan is None or self._plan.is_made
+        lost = knew and belief.status is BeliefStatus.LOST and self._status is StackStatus.RUNNING
+        if lost != self._lost:
+            what = "does not know where it is: stands until it does" if lost else "knows where it is, goes on"
+            self._journal.say(t_s, "lost" if lost else "found", f"the robot {what}")
+        self._lost = lost
+        return lost
 
     def _among_people(self, t_s: float, command: Twist, pose: Pose2, mapped_m: FloatArray) -> Twist:
         """The command as people leave it: making room where they shut the robot in, else giving way."""

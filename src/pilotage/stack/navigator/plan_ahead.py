@@ -118,6 +118,11 @@ class PlanAhead:
                 self._make(t_s, pose, "a mapped obstacle stands on the plan")
         return (pose.x_m, pose.y_m) if self._plan.progress is None else self._point_ahead()
 
+    @property
+    def is_made(self) -> bool:
+        """Whether there is a plan, or was one."""
+        return self._plan.progress is not None
+
     def _begin(self, t_s: float, belief: Belief) -> None:
         """Make the first plan, once it is known from where; say why there is none."""
         config = self._config
