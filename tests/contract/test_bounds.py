@@ -19,7 +19,7 @@ from support.component_missions import mission_with, short
 from support.outcome import MEMORY_MB, forget_peak, limited, peak_mb
 from support.told import ill_told
 
-STEPS = 5
+STEPS = 3
 SEEN: set[str] = set()
 CASES = [
     pytest.param(role, registry, entry, id=f"{role}:{entry.name}")
