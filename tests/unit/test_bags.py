@@ -292,6 +292,17 @@ def test_a_description_that_would_hang_is_not_handed_to_the_library(
     assert len(read_bag(path)) == 30
 
 
+def test_a_description_of_far_too_much_is_not_handed_to_the_library(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It read a list of 50,000 numbers for half a minute."""
+    path = write_ros2(tmp_path / "a", drive())
+    described = path / "metadata.yaml"
+    described.write_text(described.read_text() + "more: [" + "1.5, " * 50_000 + "1.5]\n")
+    monkeypatch.setattr("rosbags.highlevel.AnyReader", lambda *_, **__: pytest.fail("it was handed over"))
+    assert len(read_bag(path)) == 30
+
+
 def test_a_cut_bag_of_packed_messages(tmp_path: Path) -> None:
     path = write_ros2(tmp_path / "a", drive(400, 90), packing="MESSAGE")
     data = (path / "a.db3").read_bytes()

@@ -58,6 +58,10 @@ class OpenBag:
     warnings: tuple[str, ...]
 
 
+MOST_DESCRIBED = 10_000
+"""Values in the description of a bag: more than any has that describes its topics."""
+
+
 def bag_format(path: Path) -> BagFormat | None:
     """Tell the kind of a file by its first bytes; None if it is none of a bag's."""
     with opened(path, "a recording") as file:
@@ -80,13 +84,23 @@ def _storage_files(folder: Path) -> list[Path]:
 
 
 def _sound(folder: Path) -> bool:
-    """Whether a folder's description reads within limits and names plain files: ``rosbags`` opens them."""
+    """Whether a folder's description reads within limits and names plain files: ``rosbags`` opens them.
+
+    It reads the description again, far slower: one with too much in it is no bag's.
+    """
     try:
         described = read_yaml(folder / "metadata.yaml", "a bag's description")
         names = described["rosbag2_bagfile_information"]["relative_file_paths"]
-        return all((folder / name).is_file() for name in names)
+        return _values(described) <= MOST_DESCRIBED and all((folder / name).is_file() for name in names)
     except (InputError, OSError, KeyError, TypeError, ValueError):
         return False
+
+
+def _values(tree: object) -> int:
+    """How many values a description holds."""
+    if isinstance(tree, dict):
+        return sum(map(_values, tree.values()))
+    return sum(map(_values, tree)) if isinstance(tree, list) else 1
 
 
 def read_through(path: Path, read: Callable[[OpenBag], T]) -> T:
