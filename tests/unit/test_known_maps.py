@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import fields, replace
 
 import numpy as np
@@ -16,9 +19,11 @@ from pilotage.maps.known_maps import KEPT, MOST_ANSWERS, OncePerMap, known_map
 from pilotage.maps.landmarks import Landmarks
 from pilotage.maps.markings import FloorMarkings
 from pilotage.maps.occupancy_grid import OccupancyGrid
-from pilotage.maps.segment_map import SegmentMap
+from pilotage.maps.segment_map import SegmentMap, box_segments
 from pilotage.maps.world_map import WorldMap
 from pilotage.missions.world import WorldConfig
+from pilotage.stack.patrol import roadmap
+from pilotage.stack.patrol.roadmap import roadmap_of
 
 BOUNDS = (0.0, 0.0, 4.0, 3.0)
 
@@ -116,3 +121,42 @@ def test_an_answer_is_worked_out_once_and_of_many_the_last_are_kept() -> None:
 def test_what_differs_has_other_content(one: object, other: object) -> None:
     assert content_of(one) != content_of(other)
     assert content_of(one) == content_of(one)
+
+
+@pytest.fixture
+def hasty_threads() -> Iterator[None]:
+    """Threads that take turns as often as they can."""
+    usual = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    yield
+    sys.setswitchinterval(usual)
+
+
+@pytest.mark.usefixtures("hasty_threads")
+class TestThreads:
+    """A cluster's worker runs a trial in each of its threads; they share what a map says."""
+
+    def test_maps_are_met_and_asked_at_once(self) -> None:
+        answers: OncePerMap[int] = OncePerMap()
+        charts = [_map(name=f"map {number}") for number in range(KEPT + 3)]
+
+        def ask(number: int) -> int:
+            chart = known_map(replace(charts[number % len(charts)]))
+            return answers.get(chart, number % (MOST_ANSWERS + 5), lambda: number % (MOST_ANSWERS + 5))
+
+        with ThreadPoolExecutor(8) as pool:
+            found = list(pool.map(ask, range(4000)))
+        assert found == [number % (MOST_ANSWERS + 5) for number in range(4000)]
+
+    def test_a_roadmap_keeps_few_fields(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(roadmap, "MOST_FIELD_BYTES", 1)
+        chart = WorldMap("hall", BOUNDS, geometry=SegmentMap.of(box_segments(2.0, 1.5, 4.0, 3.0, 0.0)))
+        places = np.array([[0.5 + 0.5 * k, 1.5] for k in range(6)])
+        shared = roadmap_of(chart, places, np.zeros((0, 2)), 0.2, 1.0, 0.25, 0.5, 0.0)
+        wanted = [shared.time_s(place).copy() for place in range(6)]
+
+        def ask(number: int) -> bool:
+            return bool(np.array_equal(shared.time_s(number % 6), wanted[number % 6]))
+
+        with ThreadPoolExecutor(8) as pool:
+            assert all(pool.map(ask, range(4000)))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import lru_cache
+from threading import Lock
 from typing import Any
 
 from pilotage.logs.rosbags_extra import rosbags
@@ -16,14 +17,16 @@ KEPT = 32
 """Stores at most: the recordings of one robot tell the same types, those of a collection a few."""
 
 _kept: dict[str, Any] = {}
+_keeping = Lock()
 
 
 def shared(store: Any) -> Any:
     """The store of an earlier bag whose types have the same names, constants and fields; else this one."""
     told = repr(sorted(store.fielddefs.items()))
-    while told not in _kept and len(_kept) >= KEPT:
-        _kept.pop(next(iter(_kept)))
-    return _kept.setdefault(told, store)
+    with _keeping:
+        while told not in _kept and len(_kept) >= KEPT:
+            _kept.pop(next(iter(_kept)))
+        return _kept.setdefault(told, store)
 
 
 @lru_cache(maxsize=KEPT)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
+from threading import Lock
 from typing import Generic, TypeVar
 from weakref import WeakKeyDictionary
 
@@ -18,6 +19,8 @@ MOST_ANSWERS = 16
 T = TypeVar("T")
 
 _MET: OrderedDict[bytes, WorldMap] = OrderedDict()
+_MEETING = Lock()
+"""Trials of a cluster and environments for learning run in threads of one process."""
 
 
 def known_map(chart: WorldMap) -> WorldMap:
@@ -26,10 +29,11 @@ def known_map(chart: WorldMap) -> WorldMap:
     A mission's warm-up and its run, and all trials of a study, read the same map anew; nobody changes one.
     """
     key = content_of(chart)
-    met = _MET.setdefault(key, chart)
-    _MET.move_to_end(key)
-    if len(_MET) > KEPT:
-        _MET.popitem(last=False)
+    with _MEETING:
+        met = _MET.setdefault(key, chart)
+        _MET.move_to_end(key)
+        if len(_MET) > KEPT:
+            _MET.popitem(last=False)
     return met
 
 
@@ -38,13 +42,19 @@ class OncePerMap(Generic[T]):
 
     def __init__(self) -> None:
         self._known: WeakKeyDictionary[WorldMap, OrderedDict[Hashable, T]] = WeakKeyDictionary()
+        self._lock = Lock()
 
     def get(self, chart: WorldMap, numbers: Hashable, work_out: Callable[[], T]) -> T:
         """The answer for a map and numbers; of many the last few are kept."""
-        known = self._known.setdefault(chart, OrderedDict())
-        if numbers not in known:
-            known[numbers] = work_out()
-        known.move_to_end(numbers)
-        if len(known) > MOST_ANSWERS:
-            known.popitem(last=False)
-        return known[numbers]
+        with self._lock:
+            known = self._known.setdefault(chart, OrderedDict())
+            if numbers in known:
+                known.move_to_end(numbers)
+                return known[numbers]
+        answer = work_out()  # without the lock: others ask of other maps meanwhile
+        with self._lock:
+            answer = known.setdefault(numbers, answer)
+            known.move_to_end(numbers)
+            if len(known) > MOST_ANSWERS:
+                known.popitem(last=False)
+        return answer

@@ -24,7 +24,7 @@ from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.localization.gyro_odometry import GyroOdometry
 from pilotage.stack.localization.localizer import LOCALIZERS, require_initial_pose
 from pilotage.stack.localization.odometry_prediction import OdometryBelief, OdometryPrediction
-from pilotage.stack.localization.odometry_watch import LINEAR_RAD, OdometryWatch
+from pilotage.stack.localization.odometry_watch import LINEAR_RAD, STANDS_M, TURN_AS_PATH_M, OdometryWatch
 from pilotage.stack.localization.recovery import Recovery, RecoveryConfig
 from pilotage.stack.localization.self_check import SelfCheck
 from pilotage.stack.localization.wall_correction import correct
@@ -48,11 +48,9 @@ MOST_REFUSED = 0.25
 """Share of the lines beside walls; those of a right belief are refused in one of a thousand cases."""
 LEAST_BY_NOISE = 0.5
 """Of the lines that its noise lets through: all of a scan are refused that do not agree."""
-
-
-MOST_ALIKE, STANDS_M, TURN_AS_PATH_M = 5, 0.001, 0.5
-"""So many joint scans of several lasers count where the robot stands, moved less than this since the last
-one: beams between the lasers are off by the same in each. A turn of one radian counts as so much path."""
+MOST_ALIKE = 5
+"""So many joint scans of several lasers count where the robot stands: beams between the lasers are off by the
+same in each."""
 
 
 class EkfWallsConfig(Config):

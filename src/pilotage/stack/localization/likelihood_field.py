@@ -16,16 +16,15 @@ from pilotage.maps.occupancy_grid import FREE, UNKNOWN, OccupancyGrid
 from pilotage.maps.outlines import rim_lines
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.maps.world_map import WorldMap
+from pilotage.stack.localization.odometry_watch import STANDS_M, TURN_AS_PATH_M
 
 WALL_STD_M, GRID_SHARE = 0.01, 1.0 / 3.0
 """What walls are wrong by, and of cells which share of their side, beyond the cell itself."""
 INDEPENDENT_SHARE = 0.25
 """Of a scan's beams on cells: those on one wall end where its cells were drawn, together."""
-ALIKE_M, TURN_AS_PATH_M, LEAST_MOVE_M = 3.0, 0.5, 0.03
-"""Path over which the cells in sight, and so their errors, become others; a turn of one radian counts as so
-much path, and who stands still as one who moves a little: people and noise differ from scan to scan."""
-STANDS_M = 0.001
-"""Who moved less since the last scan stands."""
+ALIKE_M, LEAST_MOVE_M = 3.0, 0.03
+"""Path over which the cells in sight, and so their errors, become others; who stands still counts as one who
+moves a little: people and noise differ from scan to scan."""
 AT_WALL_STDS = 3
 """A beam so near to a wall ends at it."""
 TABLE_PER_STD, TABLE_STDS = 50, 12

@@ -13,6 +13,8 @@ TURN_SHARE = 0.5
 """Standard deviation of an unknown turn rate over the top one; speeds are held at the top, turns are not."""
 TOO_FAST = 1.5
 """A mean speed beyond so many times the top one was not driven."""
+STANDS_M, TURN_AS_PATH_M = 0.001, 0.5
+"""Who moved less since the last scan stands; a turn of one radian counts as so much path."""
 LINEAR_RAD = 0.5
 """Beyond this standard deviation of the heading no sighting is linear, and the robot not localized."""
 MOST_HEADING_VAR = math.pi**2 / 3.0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import math
 from dataclasses import dataclass
+from threading import RLock
 
 import numpy as np
 import scipy
@@ -24,6 +25,8 @@ FINER, MOST_NODES = (1, 2, 4), 2_000_000
 NEAREST = 6
 MOST_FIELD_BYTES = 256_000_000
 """Of fields that are kept; beyond that who was not asked for longest is worked out again."""
+_LOCK = RLock()
+"""Of what is worked out when asked for: trials in threads of one process share a map's roadmap."""
 STATION_M = 0.4
 """So far from a charging station the body may have to stand, for a wall beside it."""
 
@@ -101,16 +104,18 @@ class Roadmap:
         """The same with nodes half as far from each other, worked out once: beside bodies there may be room
         for one row of them or none. Itself where that were too many, or leaves a place without a node.
         """
-        if self._finer is None and FINER[1] ** 2 * self.slowness.size > MOST_NODES:
-            self._finer = self
-        if self._finer is None:
-            self._finer = found = copy.copy(self)
-            found._fields, found._whole, found._finer = {}, found, found
-            try:
-                found._lay(self.spacing_m / FINER[1])
-            except InputError:
+        with _LOCK:
+            if self._finer is None and FINER[1] ** 2 * self.slowness.size > MOST_NODES:
                 self._finer = self
-        return self._finer
+            if self._finer is None:
+                found = copy.copy(self)
+                found._fields, found._whole, found._finer = {}, found, found
+                try:
+                    found._lay(self.spacing_m / FINER[1])
+                    self._finer = found
+                except InputError:
+                    self._finer = self
+            return self._finer
 
     def _joined(self, clearance_m: float) -> list[tuple[int, int]]:
         """The places' nodes, between all of which the body can drive."""
@@ -223,15 +228,16 @@ class Roadmap:
             return self._whole.time_s(place)
         if self._all_kept and (known := self._fields.get(place)) is not None:
             return known
-        field = self._fields.pop(place, None)
-        if field is None:
-            field = np.full(self.slowness.shape, np.inf)
-            field[self._seeds[place]] = 0.0
-            eikonal.sweep_down(field, self.slowness, self.spacing_m)
-        self._fields[place] = field  # the last one that was asked for
-        while len(self._fields) > max(1, MOST_FIELD_BYTES // field.nbytes):
-            del self._fields[next(iter(self._fields))]
-        return field
+        with _LOCK:
+            field = self._fields.pop(place, None)
+            if field is None:
+                field = np.full(self.slowness.shape, np.inf)
+                field[self._seeds[place]] = 0.0
+                eikonal.sweep_down(field, self.slowness, self.spacing_m)
+            self._fields[place] = field  # the last one that was asked for
+            while len(self._fields) > max(1, MOST_FIELD_BYTES // field.nbytes):
+                del self._fields[next(iter(self._fields))]
+            return field
 
     def way_out(
         self, x_m: float, y_m: float, other_xy_m: tuple[float, float], keep_m: float, pass_m: float
