@@ -49,7 +49,7 @@ class TeamConfig(Config):
     """Of every robot that has none of its own; None: they cannot talk."""
     starts: tuple[PoseConfig, ...] = ()
     spacing_m: Positive = 1.5
-    """At least so far apart are starting places that are drawn, middle to middle; bodies always do."""
+    """At least so far apart are starting places that are drawn, middle to middle; wide bodies farther."""
 
     failures: tuple[Failure, ...] = ()
     battery: BatteryConfig | None = None

@@ -11,6 +11,7 @@ from pilotage.core.angles import wrap_to_pi
 from pilotage.core.types import FloatArray
 from pilotage.sensors.readings import OdometryIncrement
 from pilotage.stack.localization.likelihood_field import LikelihoodField
+from pilotage.stack.localization.odometry_watch import TURN_AS_PATH_M
 from pilotage.stack.localization.scan_search import (
     FEW_SCANS,
     LEAST_SCANS,
@@ -23,7 +24,7 @@ PATIENCE_S = 2.0
 """A filter that doubts itself for a moment often comes round; lost for longer, it searches."""
 AGAIN_SCANS = 3
 """After so many new scans it searches again."""
-TRIAL_SCANS, TRIAL_M, TURN_AS_PATH_M = 15, 1.5, 0.5
+TRIAL_SCANS, TRIAL_M = 15, 1.5
 """A place counts after so many scans and so much path from which it went on to fit,"""
 TRIAL_WEIGHT = 5.0
 """and readings of so many full scans: on open ground a few of each say next to nothing;"""
