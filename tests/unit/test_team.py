@@ -105,6 +105,8 @@ class TestTeam:
             (["team.size=0"], r"team\.size"),
             (["team.size=3", "robots=[{}]"], r"team\.size: expected 1, as many as robots lists"),
             (["team.size=2", "team.radio=telegraph"], "unknown sensor 'telegraph'"),
+            (["team.size=2", "team.radio=5"], r"^team\.radio: expected a mapping with keys of name, found 5"),
+            (["team.size=2", "team.radio={name: 5}"], r"^team\.radio\.name: input should be a valid string"),
         ],
     )
     def test_what_cannot_be_is_refused(self, overrides: list[str], told: str) -> None:

@@ -89,7 +89,8 @@ def with_team(values: dict[str, Any]) -> dict[str, Any]:
         robots = placed + [{} for _ in range(size - len(placed))]
         values = {**values, "robots": robots}
     radio = team.get("radio")
-    if radio is not None and isinstance(robots, list | tuple):
+    named = radio.get("name", RADIO) if isinstance(radio, Mapping) else radio
+    if isinstance(named, str) and isinstance(robots, list | tuple):
         entries = [_with_radio(entry, values.get("robot"), radio) for entry in robots]
         values = {**values, "robots": entries}
     return values
