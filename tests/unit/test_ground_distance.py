@@ -15,6 +15,7 @@ from pilotage.kernels.geometry import plane
 from pilotage.kernels.rrt.clearance import slack_at
 from pilotage.maps import ground_distance
 from pilotage.maps.distance_field import DistanceField
+from pilotage.maps.floor import Floor
 from pilotage.maps.ground_distance import with_circles
 from pilotage.maps.occupancy_grid import OccupancyGrid
 from pilotage.maps.segment_map import SegmentMap
@@ -68,6 +69,20 @@ def test_unknown_cells_return_no_beam_and_are_not_driven_on() -> None:
     assert chart.wall_field.at(np.array([[1.5, 2.5]]))[0] > 0.9
     known = WorldMap("known", chart.bounds_m, grid=OccupancyGrid(np.abs(cells), 0.1))
     assert known.barriers is known.walls
+
+
+def test_the_corners_around_a_turned_grid_are_no_floor() -> None:
+    """They were the larger part of what a patrol told as floor beyond reach."""
+    chart = chart_of(3, 0.35)
+    xmin, ymin, xmax, ymax = chart.bounds_m
+    x, y = np.meshgrid(np.arange(xmin, xmax, 0.2), np.arange(ymin, ymax, 0.2))
+    points = np.column_stack([x.ravel(), y.ravel()])
+    grid = chart.grid
+    assert grid is not None
+    places = grid.places_at(points)
+    outside = ((places < -2.0) | (places > np.array([grid.rows, grid.columns]) + 2.0)).any(axis=1)
+    assert outside.sum() > 100 and (chart.field.at(points)[outside] < 0.0).all()
+    assert Floor.of(chart, 0.3).apart_fraction < 0.1
 
 
 def test_discs_found_are_the_same_as_discs_told() -> None:

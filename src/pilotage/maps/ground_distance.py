@@ -19,7 +19,7 @@ ROWS_AT_ONCE = 256
 
 
 def ground_distance(barriers: SegmentMap, grid: OccupancyGrid) -> DistanceField:
-    """The field around the outlines of a grid's solid cells, negative inside them.
+    """The field around the outlines of a grid's solid cells, negative inside them and beyond the grid.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def ground_distance(barriers: SegmentMap, grid: OccupancyGrid) -> DistanceField:
         x, y = np.meshgrid(x0 + spacing * np.arange(nx), y0 + spacing * np.arange(first, first + len(band)))
         cells = grid.cells_at(np.column_stack([x.ravel(), y.ravel()]))
         inside = ((cells >= 0) & (cells < [grid.rows, grid.columns])).all(axis=1)
-        solid = np.zeros(band.size, dtype=np.bool_)
+        solid = np.ones(band.size, dtype=np.bool_)  # the corners around a turned grid are beyond its edge
         solid[inside] = blocked[cells[inside, 0], cells[inside, 1]]
         np.negative(band, out=band, where=solid.reshape(band.shape))
     return replace(field, distance_m=distance_m)
