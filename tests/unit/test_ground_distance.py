@@ -81,7 +81,8 @@ def test_the_corners_around_a_turned_grid_are_no_floor() -> None:
     assert grid is not None
     places = grid.places_at(points)
     outside = ((places < -2.0) | (places > np.array([grid.rows, grid.columns]) + 2.0)).any(axis=1)
-    assert outside.sum() > 100 and (chart.field.at(points)[outside] < 0.0).all()
+    assert outside.sum() > 100
+    assert (chart.field.at(points)[outside] < 0.0).all()
     assert Floor.of(chart, 0.3).apart_fraction < 0.1
 
 
