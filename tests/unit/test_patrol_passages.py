@@ -92,12 +92,14 @@ def test_who_turns_within_a_corridor_was_in_it_once() -> None:
     graph, passages = row(with_corridor(), (2.0, 2.5), (7.0, 2.5), (12.0, 2.5))
     assert passages.pieces == 2
     through, short = Round.through(graph, np.array([0, 1, 2])), Round.through(graph, np.array([0, 1]))
-    marks, taken_m = passages.passed(through)
-    assert marks.all(axis=1).sum() == 2  # there and back, each through both halves
+    forth, back, taken_m = passages.passed(through)
+    # There and back, each through both halves.
+    assert forth.sum(axis=1).tolist() == [2, 0]
+    assert back.sum(axis=1).tolist() == [0, 2]
     assert taken_m == pytest.approx([6.0, 6.0], abs=1.0)
     for walk in (short, Round.through(graph, np.array([1, 0]))):  # also one that begins there
-        marks, taken_m = passages.passed(walk)
-        assert marks.sum(axis=1).tolist() == [1]
+        forth, back, taken_m = passages.passed(walk)
+        assert forth.sum(axis=1).tolist() == back.sum(axis=1).tolist() == [1]
         assert taken_m == pytest.approx([6.0], abs=1.0)
 
 
@@ -107,7 +109,7 @@ def test_waits_by_hand() -> None:
     walk, left, right = (Round.through(graph, np.array(v)) for v in ([1, 2], [0, 1], [2, 3]))
     stretch = passages.stretches[1, 2][0]
     time_m = stretch.end_m - stretch.begin_m + MEETING_M
-    rate = 2.0 / walk.length_m
+    rate = 1.0 / walk.length_m  # who comes the same way is followed
     wait_m = 2.0 * rate * time_m**2 / (2.0 * (1.0 - rate * time_m))
     assert waits_m(Plan((walk,), (2,), 0.0, 0.0), passages, MEETING_M) == pytest.approx([wait_m])
     both = Plan((walk, walk), (1, 1), 0.0, 0.0)
@@ -119,6 +121,23 @@ def test_waits_by_hand() -> None:
     # Where a passage is always taken a wait is long, not without end nor below nothing.
     crowd = waits_m(Plan((walk,), (12,), 0.0, 0.0), passages, MEETING_M)
     assert wait_m < crowd[0] < 1000.0
+
+
+def test_who_go_round_one_way_wait_for_nobody() -> None:
+    """Two rooms with two doors: in by the one, out by the other. Who comes the other way round is met."""
+    walls = [(4.0, 0.0, 4.0, 1.0), (4.0, 2.0, 4.0, 6.0), (4.0, 7.0, 4.0, 8.0)]
+    floor = Floor.of(walled(8, 8, *walls), RADIUS_M)
+    places = np.array([[2.0, 1.5], [6.0, 1.5], [6.0, 6.5], [2.0, 6.5]])
+    around = np.abs(np.subtract.outer(np.arange(4), np.arange(4))) % 2 == 1
+    graph = PatrolGraph.of(places, floor.lengths_m(places, around))
+    passages = Passages.of(floor, graph, RADIUS_M)
+    assert passages.pieces == 2
+    walk, contrary = (Round.through(graph, np.array(v)) for v in ([0, 1, 2, 3], [3, 2, 1, 0]))
+    assert waits_m(Plan((walk,), (8,), 0.0, 0.0), passages, MEETING_M).tolist() == [0.0]
+    same = waits_m(Plan((walk, walk), (3, 5), 0.0, 0.0), passages, MEETING_M)
+    against = waits_m(Plan((walk, contrary), (1, 1), 0.0, 0.0), passages, MEETING_M)
+    assert same.tolist() == [0.0, 0.0]
+    assert (against > 0.1).all()
 
 
 def rooms(across: int, up: int) -> dict[str, Any]:
@@ -153,9 +172,18 @@ def test_in_rooms_robots_go_round_one_way() -> None:
     setting = planned(4, 3, 8)
     assert setting.passages.pieces > 10
     assert best_plan(setting, 8, AdaptiveRoundsConfig()).sizes == (8,)
-    # Where turning back costs nothing they are weighed as meetings alone have it.
-    free = replace(setting, turn_m=0.0)
-    assert len(best_plan(free, 8, AdaptiveRoundsConfig()).sizes) >= 7
+    # As where turning back costs nothing.
+    assert best_plan(replace(setting, turn_m=0.0), 8, AdaptiveRoundsConfig()).sizes == (8,)
+    # Who is too near behind another watches it, and is held up.
+    roomy = best_plan(setting, 8, AdaptiveRoundsConfig(headway_m=8.0))
+    assert len(roomy.sizes) > 1
+    assert all(n == 1 or walk.length_m > 8.0 * n for walk, n in zip(roomy.rounds, roomy.sizes, strict=True))
+
+
+def test_two_who_stand_at_one_place_are_on_no_round_too_near_to_each_other() -> None:
+    graph, passages = row(walled(16, 5), (1.0, 2.5), (8.0, 2.5), (15.0, 2.5))
+    setting = replace(planned(2, 2, 4), graph=graph, passages=passages, turn_m=0.0)
+    assert best_plan(setting, 4, AdaptiveRoundsConfig()).sizes == (2, 1, 1)
 
 
 def test_who_meets_mates_head_on_in_a_passage_shares_no_round_there() -> None:

@@ -20,10 +20,10 @@ FULLEST = 0.9
 def waits_m(plan: Plan, passages: Passages, meeting_m: float) -> FloatArray:
     """(G,) what a robot of each group waits in all, each time around: as a distance that it would drive.
 
-    Robots come to a passage at random, as those of different rounds do. Another one that comes through any
-    part of what this one passes keeps it out for as long as it takes itself; with rates r and times s of all
-    others the wait is sum(r s^2) / (2 (1 - sum(r s))) (Pollaczek 1930, Khinchine 1932). Those who come the
-    same way at the same time count as well, though they would follow each other.
+    Robots come to a passage at random, as those of different rounds do. Another one that comes the other way
+    through any part of what this one passes keeps it out for as long as it takes itself; with rates r and
+    times s of all such the wait is sum(r s^2) / (2 (1 - sum(r s))) (Pollaczek 1930, Khinchine 1932). Those
+    who come the same way follow each other.
 
     Parameters
     ----------
@@ -31,14 +31,14 @@ def waits_m(plan: Plan, passages: Passages, meeting_m: float) -> FloatArray:
         Beyond the passage's own length: waiting in front of it, braking and starting.
     """
     passed = [passages.passed(walk) for walk in plan.rounds]
-    group = np.repeat(np.arange(len(passed)), [len(taken_m) for _, taken_m in passed])
-    pieces = np.concatenate([marks for marks, _ in passed]).astype(np.int64)
-    taken_m = np.concatenate([taken_m for _, taken_m in passed]) + meeting_m
+    group = np.repeat(np.arange(len(passed)), [len(taken_m) for *_, taken_m in passed])
+    forth, back, taken_m = (np.concatenate(parts) for parts in zip(*passed, strict=True))
+    taken_m = taken_m + meeting_m
     length_m = np.array([max(walk.length_m, 1e-9) for walk in plan.rounds])
-    same = pieces @ pieces.T > 0
+    meet = np.logical_or(forth @ back.T, back @ forth.T)
     # Of the robots that go its own round it does not meet itself.
     others = np.array(plan.sizes)[group] - (group[:, None] == group)
-    rate = np.where(same, others / length_m[group], 0.0)
+    rate = np.where(meet, others / length_m[group], 0.0)
     share = np.minimum((rate * taken_m).sum(axis=1), FULLEST)
     wait_m = (rate * taken_m**2).sum(axis=1) / (2.0 * (1.0 - share))
     return np.array([float(wait_m[group == number].sum()) for number in range(len(passed))])

@@ -82,18 +82,20 @@ class Passages:
         """Vertices in a passage, or no farther beside one: who stands there is in the way of all others."""
         return frozenset(a for (a, _), parts in self.stretches.items() if parts[0].begin_m <= beside_m)
 
-    def passed(self, walk: Round) -> tuple[BoolArray, FloatArray]:
+    def passed(self, walk: Round) -> tuple[BoolArray, BoolArray, FloatArray]:
         """Every time that a closed walk comes through a passage.
 
         Returns
         -------
-        Which pieces it comes through then (K, P), and how long that is (K,), in metres.
+        Which pieces it comes through then one way and which the other way, (K, P) each, and how long that is
+        (K,), in metres.
         """
         times = self.times(walk)
-        marks = np.zeros((len(times), self.pieces), dtype=np.bool_)
+        forth, back = np.zeros((2, len(times), self.pieces), dtype=np.bool_)
         for row, (*_, ways) in enumerate(times):
-            marks[row, sorted({piece for piece, _ in ways})] = True
-        return marks, np.array([end_m - begin_m for begin_m, end_m, _ in times])
+            for piece, way in ways:
+                (forth if way > 0 else back)[row, piece] = True
+        return forth, back, np.array([end_m - begin_m for begin_m, end_m, _ in times])
 
     def times(self, walk: Round) -> list[tuple[float, float, set[tuple[int, int]]]]:
         """The same: from where to where along the walk, and which pieces in which direction, 1 or -1."""

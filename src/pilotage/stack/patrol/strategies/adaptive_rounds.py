@@ -33,15 +33,16 @@ class AdaptiveRoundsConfig(Config):
     """How plans are weighed, and when a robot waits or gives another one up.
 
     A plan's cost is its worst idleness plus ``mean_weight`` times its mean; of a round that several robots
-    share the worst counts ``sharing_cost`` more and the mean half of that, for what keeping apart costs. In a
-    passage that has room for one a meeting takes ``meeting_m`` of driving beside its length. Turning back
-    takes ``late_m`` more than data sheets say, for decisions are made a few times a second. Where that would
-    lead to a worst idleness of more than ``worst_ratio`` times the bound, plans are weighed with it, among
-    those in which robots on one round are ``headway_m`` apart and do not meet in passages. A robot waits
-    while it is further ahead of its place among those that share its round than ``slack`` of a mean leg
-    between stops, within which nobody knows where the others are, or ``most_slack`` of the time between them.
-    At a stop in a passage that has room for one, or no farther than ``beside_passage_m`` from it, it never
-    waits: those who are late would have to come by.
+    share the worst counts ``sharing_cost`` more and the mean half of that, for what keeping apart costs; one
+    on which they are nearer to each other than ``headway_m`` is taken only where there is no other. In a
+    passage that has room for one, meeting who comes the other way takes ``meeting_m`` of driving beside its
+    length. Turning back takes ``late_m`` more than data sheets say, for decisions are made a few times a
+    second. Where that would lead to a worst idleness of more than ``worst_ratio`` times the bound, plans are
+    weighed with it, among those in which robots on one round are ``headway_m`` apart and do not meet in
+    passages. A robot waits while it is further ahead of its place among those that share its round than
+    ``slack`` of a mean leg between stops, within which nobody knows where the others are, or ``most_slack``
+    of the time between them. At a stop in a passage that has room for one, or no farther than
+    ``beside_passage_m`` from it, it never waits: those who are late would have to come by.
     """
 
     mean_weight: NonNegative = 2.0
@@ -80,7 +81,13 @@ def best_plan(setting: PatrolSetting, robots: int, config: AdaptiveRoundsConfig)
         worst_m, mean_m = driven.expected_m(len(graph), config.sharing_cost)
         return worst_m, worst_m + config.mean_weight * mean_m
 
-    usual = min((annealed(graph, even, *weights) for even in sizes), key=lambda plan: promises(plan)[1])
+    def is_crowded(plan: Plan) -> bool:
+        shared = zip(plan.rounds, plan.sizes, strict=True)
+        return any(size > 1 and 0.0 < walk.length_m < size * config.headway_m for walk, size in shared)
+
+    # Who is watched by the one behind holds it up: such plans only where there are no others.
+    plans = (annealed(graph, even, *weights) for even in sizes)
+    usual = min(plans, key=lambda plan: (is_crowded(plan), promises(plan)[1]))
     usual = annealed(graph, usual.sizes, *weights, setting.turn_m)
     if setting.turn_m <= 0.0:
         return usual
