@@ -14,7 +14,7 @@ from pilotage.maps.floor import Floor
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.maps.world_map import WorldMap
 from pilotage.stack.patrol.graph import PatrolGraph
-from pilotage.stack.patrol.meetings import keeps_apart, slowed, waits_m
+from pilotage.stack.patrol.meetings import is_crowded, keeps_apart, slowed, waits_m
 from pilotage.stack.patrol.partition import Plan
 from pilotage.stack.patrol.passages import OPEN, Passages
 from pilotage.stack.patrol.roadmap import Roadmap
@@ -138,6 +138,18 @@ def test_who_go_round_one_way_wait_for_nobody() -> None:
     against = waits_m(Plan((walk, contrary), (1, 1), 0.0, 0.0), passages, MEETING_M)
     assert same.tolist() == [0.0, 0.0]
     assert (against > 0.1).all()
+
+
+def test_who_is_in_a_passage_has_nobody_behind_in_it() -> None:
+    graph, passages = row(with_corridor(), (2.0, 2.5), (12.0, 2.5))
+    walk, stands = Round.best(graph), Round.through(graph, np.array([0]))
+    ((begin_m, end_m, _), _) = passages.times(walk)
+    spare_m = 0.5 * walk.length_m - (end_m - begin_m)
+    assert not is_crowded(walk, 2, passages, 0.9 * spare_m)
+    assert is_crowded(walk, 2, passages, 1.1 * spare_m)
+    assert not is_crowded(walk, 2, OPEN, 1.1 * spare_m)
+    assert not is_crowded(walk, 1, passages, 100.0)
+    assert not is_crowded(stands, 2, passages, 100.0)
 
 
 def rooms(across: int, up: int) -> dict[str, Any]:

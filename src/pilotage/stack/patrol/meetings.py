@@ -44,6 +44,17 @@ def waits_m(plan: Plan, passages: Passages, meeting_m: float) -> FloatArray:
     return np.array([float(wait_m[group == number].sum()) for number in range(len(passed))])
 
 
+def is_crowded(walk: Round, size: int, passages: Passages, headway_m: float) -> bool:
+    """Whether a robot evenly spread on a round comes to a passage before the one ahead is so far out of it.
+
+    Who is held up beyond a passage would hold up others within it, in the way of all that come through.
+    """
+    if size == 1 or walk.length_m == 0.0:
+        return False
+    longest_m = max((end_m - begin_m for begin_m, end_m, _ in passages.times(walk)), default=0.0)
+    return walk.length_m / size < longest_m + headway_m
+
+
 def keeps_apart(walk: Round, size: int, passages: Passages, headway_m: float, meeting_m: float) -> bool:
     """Whether robots evenly spread on a round follow each other at a distance, and never meet head-on where
     there is room for one.
@@ -66,7 +77,7 @@ def keeps_apart(walk: Round, size: int, passages: Passages, headway_m: float, me
             apart_m = period_m if since_m == begin_m else min(apart_m, period_m - apart_m)
             if apart_m < taken_m:
                 return False
-    return period_m >= headway_m
+    return not is_crowded(walk, size, passages, headway_m)
 
 
 def slowed(plan: Plan, passages: Passages, meeting_m: float) -> Plan:

@@ -17,7 +17,7 @@ from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.patrol.hearing import Hearing, Patience
 from pilotage.stack.patrol.leg_times import LegTimes
 from pilotage.stack.patrol.looking import Looking
-from pilotage.stack.patrol.meetings import keeps_apart, slowed
+from pilotage.stack.patrol.meetings import is_crowded, keeps_apart, slowed
 from pilotage.stack.patrol.messages import NOTHING, PatrolKnowledge, PatrolState
 from pilotage.stack.patrol.partition import Plan, annealed, even_sizes
 from pilotage.stack.patrol.shut_paths import NONE_SHUT, OpenGraph, same_side
@@ -81,13 +81,13 @@ def best_plan(setting: PatrolSetting, robots: int, config: AdaptiveRoundsConfig)
         worst_m, mean_m = driven.expected_m(len(graph), config.sharing_cost)
         return worst_m, worst_m + config.mean_weight * mean_m
 
-    def is_crowded(plan: Plan) -> bool:
+    def crowds(plan: Plan) -> bool:
         shared = zip(plan.rounds, plan.sizes, strict=True)
-        return any(size > 1 and 0.0 < walk.length_m < size * config.headway_m for walk, size in shared)
+        return any(is_crowded(*walk_and_size, setting.passages, config.headway_m) for walk_and_size in shared)
 
-    # Who is watched by the one behind holds it up: such plans only where there are no others.
+    # Such plans only where there are no others.
     plans = (annealed(graph, even, *weights) for even in sizes)
-    usual = min(plans, key=lambda plan: (is_crowded(plan), promises(plan)[1]))
+    usual = min(plans, key=lambda plan: (crowds(plan), promises(plan)[1]))
     usual = annealed(graph, usual.sizes, *weights, setting.turn_m)
     if setting.turn_m <= 0.0:
         return usual
