@@ -14,7 +14,7 @@ from collections.abc import Iterator
 import pytest
 from hypothesis import settings
 
-from support.warm_workers import WarmContext, warm_context
+from support.warm_workers import warm_context
 
 # No test opens a window, and figures look the same on every machine.
 os.environ["MPLBACKEND"] = "Agg"
@@ -63,15 +63,8 @@ def _workers_are_forked() -> Iterator[None]:
     """Workers that are started from this process do not import everything anew (``support.warm_workers``)."""
     from pilotage.experiments import worker_processes
 
-    made: list[WarmContext] = []
-
-    def context() -> WarmContext:
-        if not made:
-            made.append(warm_context())
-        return made[0]
-
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(worker_processes, "context", context)
+        patch.setattr(worker_processes, "context", warm_context)
         yield
 
 
@@ -81,7 +74,12 @@ def _registered_for_one_test_only() -> Iterator[None]:
     roles = sys.modules.get("pilotage.experiments.roles")
     registries = [] if roles is None else list(roles.ROLES.values())
     before = [set(registry._entries) for registry in registries]
+    files = os.environ.get("PILOTAGE_PLUGINS")
     yield
+    if files is None:
+        os.environ.pop("PILOTAGE_PLUGINS", None)  # processes that later tests start would load them
+    else:
+        os.environ["PILOTAGE_PLUGINS"] = files
     if roles is None:
         roles = sys.modules.get("pilotage.experiments.roles")
         registries = [] if roles is None else list(roles.ROLES.values())

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import itertools
 import json
 import os
 import random
@@ -23,20 +24,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from pilotage.cli.main import main as main_of_pilotage
 from pilotage.core.errors import InputError
 from pilotage.experiments.studies.database import DATABASE
 from pilotage.experiments.studies.rows import read_rows
 from support.fuzz_targets import BY_NAME, QUICK
 from support.fuzz_targets.target import write_yaml
 from support.outcome import run
+from support.warm_commands import start
 
-LOOP = """
-import itertools, json, sys
-from pilotage.cli.main import main
-for k in itertools.count():
-    main([word.replace("NUMBER", str(k)) for word in json.loads(sys.argv[1])])
-    print(k, flush=True)
-"""
 LONGEST_WAIT_S = 0.4
 ROWS = 24
 
@@ -109,16 +105,26 @@ def end(child: subprocess.Popen[str]) -> None:
     child.communicate()
 
 
+def repeat(words: Sequence[str]) -> int:
+    """One command again and again, with the number of each in the place of NUMBER."""
+    for k in itertools.count():
+        main_of_pilotage([word.replace("NUMBER", str(k)) for word in words])
+        print(k, flush=True)
+    return 0
+
+
 def killed(victim: Victim, folder: Path, rng: random.Random) -> list[str]:
     """Kill it once; returns what is not whole."""
     victim.write(folder)
-    child = children_of(folder, "-c", LOOP, json.dumps(victim.words))
-    assert child.stdout is not None
-    try:
-        child.stdout.readline()  # the first one compiles and imports
-        time.sleep(rng.uniform(0.0, LONGEST_WAIT_S))
-    finally:
-        end(child)
+    with tempfile.TemporaryDirectory(prefix="pilotage-killed-") as place:
+        child = start(Path(place), repeat, victim.words, folder=folder)
+        try:
+            child.line(0)  # the first one compiles and imports
+            time.sleep(rng.uniform(0.0, LONGEST_WAIT_S))
+        finally:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(child.pid, signal.SIGKILL)
+            child.ended()
     made = sorted(path for path in folder.glob(victim.made) if not path.name.startswith("."))
     if not made:
         return ["nothing was made"]

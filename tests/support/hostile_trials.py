@@ -28,6 +28,17 @@ def work(pipe: Connection, base: Mapping[str, Any], memory_bytes: int) -> None:
     local_workers._work(pipe, base, memory_bytes)
 
 
+def sweep(folder: Path, workers: int) -> int:
+    """The command whose trials obey the orders: three radii, six seeds, as the study ``x`` in ``folder``."""
+    from pilotage.cli.main import main
+
+    local_workers._work = work
+    words = ["sweep", "museum-plan", "--vary", "stack.planner.turning_radius_m=0.3,0.5,0.8", "--trials", "6"]
+    words += ["--name", "x", "--no-report", "--quiet", "--out", str(folder), "--workers", str(workers)]
+    sys.argv[1:] = words
+    return main()
+
+
 def instead(row: int, mission: Any) -> Outcome:
     """In the place of a run: the row's order, else a number that its seed and radius give."""
     orders = dict(order.split(":") for order in os.environ[ORDERS].split(",") if order)

@@ -10,6 +10,7 @@ their workers, as they do for users (``test_studies_signals``, ``test_run_pool``
 from __future__ import annotations
 
 import os
+from functools import cache
 from multiprocessing import forkserver
 from multiprocessing.context import ForkServerContext, ForkServerProcess
 from pathlib import Path
@@ -38,6 +39,7 @@ class WarmContext(ForkServerContext):
     Process = WarmProcess
 
 
+@cache
 def warm_context() -> WarmContext:
     """A context whose server runs from now on, with ``worker_imports`` imported."""
     context = WarmContext()

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
-import subprocess
-import sys
 from dataclasses import dataclass
 from pathlib import Path as FilePath
 from types import SimpleNamespace
@@ -40,6 +37,7 @@ from pilotage.stack.mapping.mapper import MAPPERS
 from pilotage.stack.patrol.strategy import STRATEGIES
 from pilotage.stack.planning.local_planner import LOCAL_PLANNERS, LocalPath
 from pilotage.stack.planning.planner import PLANNERS, SMOOTHERS, Path, PlanRequest, PlanResult, PlanStatus
+from support.warm_commands import pilotage
 
 NAN = math.nan
 ROUNDED = np.diag([0.1, 0.1, 0.0]) - 1e-14 * np.eye(3)
@@ -243,7 +241,6 @@ def test_metrics_look_at_a_run_and_leave_it_alone() -> None:
 
 # Installed packages
 
-RUN = "import sys; from pilotage.cli.main import main; sys.exit(main(sys.argv[1:]))"
 PLANNER = """
 from pilotage.core.config import Config
 from pilotage.evaluation.metric import Metric
@@ -271,20 +268,6 @@ def install(folder: FilePath, package: str, module: str, text: str) -> None:
     (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n")
     (about / "entry_points.txt").write_text(f"[{plugins.GROUP}]\n{package}-entry = {module}\n")
     (folder / f"{module}.py").write_text(text)
-
-
-def pilotage(*words: str, folder: FilePath, site: FilePath) -> subprocess.CompletedProcess[str]:
-    path = os.pathsep.join([str(site), *sys.path])
-    environment = {**os.environ, "PYTHONPATH": path}
-    environment.pop(plugins.VARIABLE, None)
-    return subprocess.run(
-        [sys.executable, "-c", RUN, *words],
-        cwd=folder,
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
 
 
 def test_an_installed_package_is_named_by_what_needs_it(tmp_path: FilePath) -> None:

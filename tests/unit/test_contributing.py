@@ -19,6 +19,7 @@ import pytest
 from pilotage.cli.main import main
 from pilotage.core import plugins
 from pilotage.experiments.roles import ROLES
+from support.warm_commands import pilotage
 
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "CONTRIBUTING.md").read_text()
@@ -35,21 +36,7 @@ for room in {path.parent for path in pathlib.Path("rooms").rglob("*.py")}:
 sys.exit(main(sys.argv[1:]))
 """
 """The rooms with one more module each, as if it stood there."""
-FROM_OUTSIDE = "import sys; from pilotage.cli.main import main; sys.exit(main(sys.argv[1:]))"
-
-
-def run(folder: Path, program: str, *words: str) -> subprocess.CompletedProcess[str]:
-    """In a process of its own: what is registered stays for as long as a process lives."""
-    environment = {key: value for key, value in os.environ.items() if key != plugins.VARIABLE}
-    (folder / "a-stroll.yaml").write_text(MISSION)
-    return subprocess.run(
-        [sys.executable, "-c", program, "run", "a-stroll.yaml", "--json", "--out", "runs", *words],
-        cwd=folder,
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+RUN = "run", "a-stroll.yaml", "--json", "--out", "runs"
 
 
 def check(done: subprocess.CompletedProcess[str]) -> float:
@@ -78,7 +65,16 @@ def test_the_examples_run_from_inside(tmp_path: Path) -> None:
         path = tmp_path / "rooms" / place
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text)
-    assert check(run(tmp_path, FROM_INSIDE)) >= 2.0
+    (tmp_path / "a-stroll.yaml").write_text(MISSION)
+    done = subprocess.run(
+        [sys.executable, "-c", FROM_INSIDE, *RUN],
+        cwd=tmp_path,
+        env={key: value for key, value in os.environ.items() if key != plugins.VARIABLE},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert check(done) >= 2.0
 
 
 def test_the_examples_run_from_outside(tmp_path: Path) -> None:
@@ -94,7 +90,8 @@ def test_the_examples_run_from_outside(tmp_path: Path) -> None:
         assert f"--plugin {name}.py" in TEXT
     (metric,) = re.findall(r"^```python\n# wobble.py\n(.*?)^```", TEXT, re.MULTILINE | re.DOTALL)
     (tmp_path / "wobble.py").write_text(metric)
-    done = run(tmp_path, FROM_OUTSIDE, *words, "--plugin", "wobble.py")
+    (tmp_path / "a-stroll.yaml").write_text(MISSION)
+    done = pilotage(*RUN, *words, "--plugin", "wobble.py", folder=tmp_path)
     assert check(done) >= 2.0
     assert json.loads(done.stdout)["wobble_rad"] > 0.0
 

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +12,7 @@ import yaml
 from pilotage.cli.main import main
 from pilotage.core import plugins
 from support.missions import reach
+from support.warm_commands import pilotage
 
 FOLDER = Path(__file__).parents[1] / "support" / "plugins"
 FILES = sorted(str(path) for path in FOLDER.glob("*.py"))
@@ -27,9 +25,6 @@ REGISTERED = {
 }
 
 
-RUN = "import sys; from pilotage.cli.main import main; sys.exit(main(sys.argv[1:]))"
-
-
 def mission() -> dict[str, Any]:
     """Half the room at a stroll, on nothing but what the plugins bring."""
     values = reach(mission="a-stroll")
@@ -39,19 +34,6 @@ def mission() -> dict[str, Any]:
     values["stack"] |= {"localizer": {"name": "last-fix"}, "planner": {"name": "straight-line"}}
     values["task"] = {"name": "stroll", "distance_m": 1.5}
     return values
-
-
-def pilotage(*words: str, folder: Path) -> subprocess.CompletedProcess[str]:
-    """A process of its own: what a plugin registers stays for as long as a process lives."""
-    environment = {key: value for key, value in os.environ.items() if key != plugins.VARIABLE}
-    return subprocess.run(
-        [sys.executable, "-c", RUN, *words],
-        cwd=folder,
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
 
 
 def named(files: list[str]) -> list[str]:

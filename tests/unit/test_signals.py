@@ -18,79 +18,44 @@ import pytest
 from pilotage.cli import app
 from pilotage.cli.main import main
 from pilotage.core.interruptions import Terminated, interruptible, interruption_in
+from support.endless_runs import endless
+from support.warm_commands import start
 
 SIGNALS = 12
 LONGEST_WAIT_S = 0.15
 
-ENDLESS = """
-import sys
-import pilotage.experiments.run as lab
-from pilotage.cli.main import main
 
-once = lab.run_mission
-warm = []
-
-def endless(mission, **options):
-    if not warm:
-        warm.append(once(mission, save=False))
-    print("ready", flush=True)
-    while True:
-        once(mission, save=False)
-
-lab.run_mission = endless
-short = ["run", "museum-1", "--set", "run.time_limit_s=3", "--quiet"]
-if len(sys.argv) > 1:
-    sys.argv[1:] = short
-    sys.exit(main())
-while True:
-    print(main(short), flush=True)
-"""
-
-
-def started(*arguments: str) -> subprocess.Popen[str]:
-    return subprocess.Popen(
-        [sys.executable, "-c", ENDLESS, *arguments],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
-    )
-
-
-def test_a_signal_at_any_moment_of_a_run_is_one_line() -> None:
+def test_a_signal_at_any_moment_of_a_run_is_one_line(tmp_path: Path) -> None:
     """The moments are random: a fault that shows once in twenty signals is found in half the runs."""
     moments = random.Random(5)
-    child = started()
-    assert child.stdout is not None
+    child = start(tmp_path / "streams", endless, False, folder=tmp_path)
     codes = []
     sent = [moments.choice([signal.SIGINT, signal.SIGTERM]) for _ in range(SIGNALS)]
     try:
-        for number in sent:
-            line = child.stdout.readline()
-            assert line == "ready\n", (line, child.poll())
+        for k, number in enumerate(sent):
+            assert child.line(2 * k) == "ready\n", child.err.read_text()
             time.sleep(moments.uniform(0.0, LONGEST_WAIT_S))
-            child.send_signal(number)
-            code = child.stdout.readline()
-            assert code, f"ended by itself: {child.wait()}"
+            os.kill(child.pid, number)
+            code = child.line(2 * k + 1)
+            assert code, "ended by itself"
             codes.append(int(code))
     finally:
-        child.kill()
-        _, err = child.communicate()
+        child.process.kill()
+        err = child.ended().stderr
     assert codes == [130 if number == signal.SIGINT else 143 for number in sent], err
     lines = {130: "pilotage: interrupted", 143: "pilotage: ended by SIGTERM"}
     assert err.splitlines() == [lines[code] for code in codes]
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_a_second_signal_changes_nothing(number: int, code: int) -> None:
-    child = started("for good")
-    assert child.stdout is not None
-    assert child.stdout.readline() == "ready\n"
-    child.send_signal(number)
-    child.send_signal(number)
-    _, err = child.communicate()
-    assert child.returncode == code
-    assert err.count("\n") == 1
+def test_a_second_signal_changes_nothing(number: int, code: int, tmp_path: Path) -> None:
+    child = start(tmp_path / "streams", endless, True, folder=tmp_path)
+    assert child.line(0) == "ready\n"
+    os.kill(child.pid, number)
+    os.kill(child.pid, number)
+    done = child.ended()
+    assert done.returncode == code
+    assert done.stderr.count("\n") == 1
 
 
 HALF_MADE = """

@@ -7,53 +7,36 @@ import os
 import random
 import signal
 import sqlite3
-import subprocess
-import sys
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from pilotage.cli.main import main
 from pilotage.cli.study import _print_cells
 from pilotage.cli.study_page import write_study_report
-from pilotage.core.config import validate
 from pilotage.core.errors import InputError
 from pilotage.evaluation.metrics import METRICS
 from pilotage.experiments.run import run_mission
 from pilotage.experiments.studies import dask_workers
 from pilotage.experiments.studies.attribution import attribution_of, attribution_study
 from pilotage.experiments.studies.database import DATABASE
-from pilotage.experiments.studies.definition import StudyDefinition
 from pilotage.experiments.studies.engine import run_study
 from pilotage.experiments.studies.findings import study_object
 from pilotage.experiments.studies.options import StudyOptions
 from pilotage.experiments.studies.replay import mission_from
 from pilotage.experiments.studies.rows import read_rows
 from pilotage.experiments.studies.store import Store
-from pilotage.experiments.studies.study import Study, load_study, make_study, shipped_studies
+from pilotage.experiments.studies.study import load_study, shipped_studies
 from pilotage.experiments.studies.sweep import parse_vary, sweep_study
 from pilotage.experiments.studies.table import read_study
 from pilotage.experiments.studies.trial import Outcome
 from pilotage.records.metrics import clean
+from support.small_study import run_small, small
+from support.warm_commands import start
 
 ONE = StudyOptions(workers=1)
-
-
-def small(**changes: Any) -> Study:
-    """A study of short missions: three radii, four seeds."""
-    values: dict[str, Any] = {
-        "study": "small",
-        "mission": "museum-plan",
-        "set": {"stack.planner.iterations": 300, "stack.planner.stop": "first"},
-        "factors": [{"key": "stack.planner.turning_radius_m", "values": [0.3, 0.5, 0.8]}],
-        "trials": 4,
-        "metrics": ["planned_length_m", "smoothness"],
-        "primary": "planned_length_m",
-    }
-    return make_study(validate(StudyDefinition, values | changes, ""))
 
 
 def numbers(folder: Path) -> list[tuple[int, int, int, str, str]]:
@@ -124,16 +107,6 @@ def test_a_row_can_be_run_again_bit_equal(undisturbed: Path) -> None:
 def test_killed_again_and_again_it_ends_as_if_nothing_had_been(undisturbed: Path, tmp_path: Path) -> None:
     """SIGKILL to parent and workers while rows come in; the last process is left to finish."""
     folder, rng = tmp_path / "killed", random.Random(6)
-    tests = Path(__file__).parents[1]
-    script = (
-        f"import sys; from pathlib import Path; sys.path.insert(0, {str(tests)!r})\n"
-        "from unit.test_studies import small\n"
-        "from pilotage.experiments.studies.engine import run_study\n"
-        "from pilotage.experiments.studies.options import StudyOptions\n"
-        "if __name__ == '__main__':\n"
-        "    options = StudyOptions(workers=2, resume=len(sys.argv) > 1)\n"
-        f"    run_study(small(), Path({str(folder)!r}), options)\n"
-    )
 
     def done() -> int:
         if not (folder / DATABASE).is_file():
@@ -142,15 +115,15 @@ def test_killed_again_and_again_it_ends_as_if_nothing_had_been(undisturbed: Path
 
     before = 0
     for kill in range(2):
-        process = subprocess.Popen([sys.executable, "-c", script, *["again"] * kill], start_new_session=True)
-        while done() < before + 2 and process.poll() is None:
-            time.sleep(0.005)
+        process = start(tmp_path / f"{kill}", run_small, folder, kill > 0, folder=tmp_path)
+        while done() < before + 2 and not process.over:
+            time.sleep(0.03)
         time.sleep(rng.uniform(0.0, 0.1))
         if kill == 1:
             os.kill(process.pid, signal.SIGKILL)  # the parent alone: its workers follow
         else:
             os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
+        process.ended()
         assert done() > before
         before = done()
     run_study(small(), folder, StudyOptions(workers=2, resume=True))

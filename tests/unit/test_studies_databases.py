@@ -25,7 +25,8 @@ from pilotage.experiments.studies.options import StudyOptions
 from pilotage.experiments.studies.owners import is_gone
 from pilotage.experiments.studies.store import Store
 from pilotage.experiments.studies.trial import Outcome
-from support.hostile_studies import TESTS, expected, rows_of, study_of
+from support.hostile_studies import expected, rows_of, share, study_of
+from support.warm_commands import start
 
 
 @pytest.fixture(scope="module")
@@ -124,33 +125,14 @@ def test_the_database_of_something_else_is_left_alone(tmp_path: Path) -> None:
 
 
 def test_many_processes_that_begin_at_once_share_every_row_once(tmp_path: Path) -> None:
-    script = f"""
-import sys
-sys.path.insert(0, {str(TESTS)!r})
-from pathlib import Path
-from support.hostile_studies import study_of
-from pilotage.experiments.studies.store import Store
-from pilotage.experiments.studies.trial import Outcome
-study = study_of()
-sys.stdin.readline()
-store = Store(Path({str(tmp_path)!r}) / "x", study)
-while tasks := store.claim(1):
-    print(tasks[0].row)
-    store.finish(Outcome(tasks[0].row, {{"n": 1.0}}, {{}}))
-store.close()
-"""
-    crew = [
-        subprocess.Popen(
-            [sys.executable, "-c", script], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-        )
-        for _ in range(3)
-    ]
+    go = tmp_path / "go"
+    crew = [start(tmp_path / f"{k}", share, tmp_path / "x", go, folder=tmp_path) for k in range(3)]
     for process in crew:
-        assert process.stdin is not None
-        process.stdin.write("go\n")
-        process.stdin.flush()
-    claimed = [int(line) for process in crew for line in process.communicate()[0].split()]
-    assert [process.returncode for process in crew] == [0] * 3
+        assert process.line(0) == "here\n"
+    go.touch()
+    done = [process.ended() for process in crew]
+    assert [(process.returncode, process.stderr) for process in done] == [(0, "")] * 3
+    claimed = [int(line) for process in done for line in process.stdout.split()[1:]]
     assert sorted(claimed) == list(range(18))
     assert [row["status"] for row in rows_of(tmp_path / "x")] == ["done"] * 18
 

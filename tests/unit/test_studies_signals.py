@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -17,20 +16,9 @@ import pytest
 
 from pilotage.cli.main import main
 from pilotage.experiments.studies.store import Store
-from support.hostile_studies import TESTS, expected, rows_of, study_of
-
-SLOW = f"""
-import sys
-sys.path.insert(0, {str(TESTS)!r})
 from support import hostile_trials
-from pilotage.experiments.studies import local_workers
-from pilotage.cli.main import main
-if __name__ == "__main__":
-    local_workers._work = hostile_trials.work
-    sys.argv[1:] = ["sweep", "museum-plan", "--vary", "stack.planner.turning_radius_m=0.3,0.5,0.8",
-                    "--trials", "6", "--name", "x", "--no-report", "--quiet", *sys.argv[1:]]
-    sys.exit(main())
-"""
+from support.hostile_studies import expected, rows_of, study_of
+from support.warm_commands import start
 
 
 def descendants(pid: int) -> set[int]:
@@ -62,39 +50,27 @@ def test_a_signal_ends_it_without_orphans(
     order: Callable[..., None], tmp_path: Path, sent: tuple[int, ...], group: bool, code: int, told: str
 ) -> None:
     order("4:slow")
-    process = subprocess.Popen(
-        [
-            sys.executable,
-            "-c",
-            SLOW,
-            "--out",
-            str(tmp_path),
-            "--workers",
-            "2" if sent[0] == signal.SIGINT else "1",
-        ],
-        start_new_session=True,
-        stderr=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-    )
+    workers = 2 if sent == (signal.SIGINT,) else 1
+    process = start(tmp_path / "streams", hostile_trials.sweep, tmp_path, workers, folder=tmp_path)
     marks = tmp_path / "marks"
     while not list(marks.glob("4-*")):
-        assert process.poll() is None, process.communicate()
-        time.sleep(0.01)
+        assert not process.over, process.ended()
+        time.sleep(0.03)
     began = time.monotonic()
     for number in sent:
         if group:
             os.killpg(process.pid, number)
         else:
             os.kill(process.pid, number)
-        time.sleep(0.01)
-    _, err = process.communicate()
-    assert process.returncode == code
+        time.sleep(0.03)
+    done = process.ended()
+    err = done.stderr
+    assert done.returncode == code
     assert err.splitlines()[-1:] == ([] if not told else err.splitlines()[:1])  # one line, no traceback
     assert err.startswith(told)
     # Its trial would sleep for ten minutes: what is gone by then was ended, however slow the machine is.
     while descendants(process.pid) and time.monotonic() < began + 300.0:
-        time.sleep(0.01)
+        time.sleep(0.03)
     assert not descendants(process.pid)
     rows = rows_of(tmp_path / "x")
     assert rows[4]["status"] == ("running" if code == -9 else "pending")
