@@ -13,7 +13,7 @@ SHORT = ["run", "museum-1", "--set", "run.time_limit_s=3", "--quiet"]
 
 def endless(for_good: bool) -> int:
     """Run until a signal ends it; the first run is over where it says that it is ready."""
-    once, warm = lab.run_mission, []
+    once, warm = lab.run_mission, list[Any]()
 
     def again_and_again(mission: Any, **_: Any) -> Any:
         if not warm:

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from matplotlib.axis import YAxis
+from matplotlib.axis import Axis, YAxis
 from rich.console import Console
 from scipy.stats import chi2
 
@@ -207,3 +207,37 @@ def test_titles_are_placed_without_laying_out_numbers_where_none_is_in_their_way
     assert bool(laid_out) is looks
     monkeypatch.setattr(style, "_let_titles_stay", lambda _: None)
     assert drawn() == now
+
+
+@pytest.mark.parametrize("label", ["", "how much"])
+@pytest.mark.parametrize("log", [False, True])
+def test_ticks_that_nobody_styled_one_by_one_are_as_matplotlib_copies_them(
+    label: str, log: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Lines of the grid end at the panel, numbers keep their size; the words of an axis stay beside them."""
+
+    def drawn() -> str:
+        with style.drawing_style():
+            figure, panels = style.stacked_axes(["what it is [m]", "and more"], [60.0, 40.0])
+            for panel in panels:
+                style.series(panel, np.arange(5.0), np.linspace(1.0, 900.0, 5), style.BLUE)
+                panel.set_ylabel(label)
+            panels[1].tick_params(axis="y", labelcolor=style.GREEN, labelsize=6.0, length=2.0)
+            if log:
+                style.logarithmic(panels[0], 1.0, 900.0)
+            style.time_limits(panels, np.arange(5.0))
+            return style.render(figure, "it", "it")
+
+    copied: list[Any] = []
+    copy = vars(Axis)["_copy_tick_props"]
+
+    def counted(self: Axis, *ticks: Any) -> None:
+        copied.append(ticks)
+        copy(self, *ticks)
+
+    monkeypatch.setattr(Axis, "_copy_tick_props", counted)
+    now = drawn()
+    before = len(copied)
+    monkeypatch.setattr(style, "_let_ticks_be_as_told", lambda _: None)
+    assert drawn() == now
+    assert len(copied) > 2 * before + 10

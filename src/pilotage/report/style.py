@@ -18,6 +18,7 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Tick
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
@@ -256,6 +257,7 @@ def render(figure: Figure, slug: str, alt: str) -> str:
     """
     buffer = io.StringIO()
     _let_titles_stay(figure)
+    _let_ticks_be_as_told(figure)
     with mpl.rc_context({"svg.hashsalt": slug}):
         FigureCanvasSVG(figure)
         figure.savefig(buffer, format="svg", facecolor="none", metadata={"Date": None})
@@ -286,6 +288,26 @@ def _let_titles_stay(figure: Figure) -> None:
     if bottom and all(_PLAIN[0] <= most <= _PLAIN[1] for most in numbers):
         for axes in figure.axes:
             vars(axes)["_autotitlepos"] = False
+
+
+def _let_ticks_be_as_told(figure: Figure) -> None:
+    """Spare matplotlib what changes nothing here: an eighth of the time of a page.
+
+    Ticks are styled by ``tick_params`` alone, so that a new one has all that its axis's first one has, but
+    for where its line ends. An axis without words has none whose place its numbers tell.
+    """
+    for axes in figure.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            vars(axis)["_copy_tick_props"] = _clip_alike
+            if not axis.get_label_text():
+                vars(axis)["_autolabelpos"] = False
+
+
+def _clip_alike(first: Tick, made: Tick) -> None:
+    if first is not made:
+        clip = vars(first.gridline)["_clippath"]
+        made.gridline.set_clip_path(clip)
+        made.gridline.clipbox = first.gridline.clipbox
 
 
 def _short_outline(match: re.Match[str]) -> str:
