@@ -1,6 +1,6 @@
 """A corpus of damaged run folders through ``pilotage report``: a page or one line, never more than that.
 
-Of all the ways some are drawn, and up to six of them befall six files of one folder: a page tells of each
+Of all the ways some are drawn, and up to nine of them befall nine files of one folder: a page tells of each
 file that it was made without, and to draw a page is what takes time. Where one makes the folder no run at
 all, the others are tried again without it. ``PILOTAGE_DAMAGED_RUNS=1`` takes all ways, each by itself.
 """
@@ -26,7 +26,7 @@ from support.damaged_runs import Damage, damages
 from support.fabricated_run import fabricate_run
 from support.laser_drives import laser_drive
 
-DRAWN, AT_ONCE = 18, 6
+DRAWN, AT_ONCE = 18, 9
 """Of each kind of folder; PILOTAGE_DAMAGED_RUNS tries all damages, the fuzz tests draw others."""
 
 

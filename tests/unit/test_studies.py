@@ -86,9 +86,11 @@ def test_a_cluster_gives_the_same_rows(
     distributed = pytest.importorskip("distributed", reason="needs the extra cluster")
     dask = pytest.importorskip("dask")
     monkeypatch.setattr(dask_workers, "CONNECT_S", 600)  # a slow machine's processes answer late
-    patience = {f"distributed.comm.timeouts.{name}": "600s" for name in ("connect", "tcp")}
+    settings = {f"distributed.comm.timeouts.{name}": "600s" for name in ("connect", "tcp")}
+    # From the server of these tests' own workers, which has imported what a trial needs.
+    settings["distributed.worker.multiprocessing-method"] = "forkserver"
     with (
-        dask.config.set(patience),
+        dask.config.set(settings),
         distributed.LocalCluster(
             n_workers=2, threads_per_worker=1, dashboard_address=":0", processes=True
         ) as cluster,
