@@ -36,11 +36,18 @@ def healthy(tmp_path_factory: pytest.TempPathFactory) -> Healthy:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_healthy_inputs_do_what_they_should(name: str, healthy: Healthy, tmp_path: Path) -> None:
-    """Else the damage is never reached."""
+def test_healthy_inputs_do_what_they_should_whatever_their_names(
+    name: str, healthy: Healthy, tmp_path: Path
+) -> None:
+    """Else the damage is never reached; no name reaches the terminal or breaks what is written."""
     target = BY_NAME[name]
-    outcome = run(target.words, healthy.copy(target, tmp_path / "case"))
-    assert not outcome.faults()
+    folder = healthy.copy(target, tmp_path / "case")
+    words = renamed(target, folder, damage.MARKS[NAMES.index(name) % len(damage.MARKS)])
+    outcome = run(words, folder)
+    assert not outcome.faults(), words
+    if "expected a name without control characters" in outcome.err:  # a course's mission has its file's
+        outcome = run(target.words, healthy.copy(target, tmp_path / "case"))
+        assert not outcome.faults()
     assert outcome.code in ((0, 1) if name.startswith("run") else (0,)), outcome.err
 
 
@@ -60,17 +67,6 @@ def test_what_is_something_else_is_refused(name: str, healthy: Healthy, tmp_path
         # Columns with their unit are just what a range log is.
         right = kind == "a thousand columns" and name == "calibrate range"
         assert outcome.code in ((0,) if right else (2, *target.goes_on)), (kind, path.name)
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_no_file_name_reaches_the_terminal_or_breaks_what_is_written(
-    name: str, healthy: Healthy, tmp_path: Path
-) -> None:
-    target = BY_NAME[name]
-    folder = healthy.copy(target, tmp_path / "case")
-    words = renamed(target, folder, damage.MARKS[NAMES.index(name) % len(damage.MARKS)])
-    outcome = run(words, folder)
-    assert not outcome.faults(), words
 
 
 @pytest.mark.parametrize("name", NAMES)
