@@ -12,7 +12,9 @@ import re
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from copy import copy
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import matplotlib as mpl
@@ -291,23 +293,38 @@ def _let_titles_stay(figure: Figure) -> None:
 
 
 def _let_ticks_be_as_told(figure: Figure) -> None:
-    """Spare matplotlib what changes nothing here: an eighth of the time of a page.
+    """Spare matplotlib what changes nothing here: a quarter of the time of a page.
 
-    Ticks are styled by ``tick_params`` alone, so that a new one has all that its axis's first one has, but
-    for where its line ends. An axis without words has none whose place its numbers tell.
+    Ticks are styled by ``tick_params`` alone, so that all of an axis look like its first one; each would be
+    made of five new objects, and then told all that the first one's have. An axis without words has none
+    whose place its numbers tell.
     """
     for axes in figure.axes:
         for axis in (axes.xaxis, axes.yaxis):
+            vars(axis)["_get_tick"] = partial(_tick_of, axis)
             vars(axis)["_copy_tick_props"] = _clip_alike
             if not axis.get_label_text():
                 vars(axis)["_autolabelpos"] = False
 
 
+def _tick_of(axis: Any, major: bool) -> Tick:
+    """One more: the first one's copy; what is not shown of them is one and the same."""
+    if not major or not vars(axis).get("majorTicks"):
+        made: Tick = type(axis)._get_tick(axis, major)
+        return made
+    made = copy(axis.majorTicks[0])
+    for part in made.get_children():
+        if part.get_visible():
+            name = next(name for name, value in vars(made).items() if value is part)
+            setattr(made, name, copy(part))
+    return made
+
+
 def _clip_alike(first: Tick, made: Tick) -> None:
-    if first is not made:
-        clip = vars(first.gridline)["_clippath"]
+    """Lines of the grid end where the panel does."""
+    clip = vars(first.gridline)["_clippath"]
+    if vars(made.gridline)["_clippath"] is not clip:
         made.gridline.set_clip_path(clip)
-        made.gridline.clipbox = first.gridline.clipbox
 
 
 def _short_outline(match: re.Match[str]) -> str:
