@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
+from pilotage.core.angles import wrap_array_to_pi
 from pilotage.core.types import FloatArray
 from pilotage.logs.odometry_steps import OdometryForm, OdometrySteps, arc_ends
 
 
 def drive(arc_m: FloatArray, turn_rad: FloatArray, heading_rad: float = 0.0) -> tuple[FloatArray, FloatArray]:
-    """True poses (N, 3) before and after each step."""
-    poses = np.zeros((arc_m.shape[0] + 1, 3))
-    poses[0, 2] = heading_rad
-    for i in range(arc_m.shape[0]):
-        poses[i + 1] = arc_ends(poses[i : i + 1], arc_m[i : i + 1], turn_rad[i : i + 1])[0]
+    """True poses (N, 3) before and after each step: arcs from the origin, laid end to end."""
+    turned = np.concatenate([[0.0], np.cumsum(turn_rad)])
+    steps = arc_ends(np.column_stack([np.zeros((len(arc_m), 2)), heading_rad + turned[:-1]]), arc_m, turn_rad)
+    poses = np.zeros((len(arc_m) + 1, 3))
+    poses[1:, :2] = np.cumsum(steps[:, :2], axis=0)
+    poses[:, 2] = wrap_array_to_pi(heading_rad + turned)
     return poses[:-1], poses[1:]
 
 
