@@ -14,7 +14,7 @@ from typing import Any, TypeAlias, TypeVar
 
 from pilotage.core.errors import InputError
 from pilotage.core.files import opened, read_yaml
-from pilotage.logs.message_types import shared, shipped_types, told_types
+from pilotage.logs.message_types import sharing, shipped_types, told_types
 from pilotage.logs.rosbags_extra import rosbags
 from pilotage.logs.salvage.found import MAGIC_OF, BagFormat, Salvage
 from pilotage.logs.salvage.pieces import unpack
@@ -131,7 +131,7 @@ def open_whole(path: Path, stack: ExitStack) -> OpenBag | None:
     InputError
         Where ``rosbags`` is not installed, or the path cannot be read or is no bag.
     """
-    highlevel = rosbags("highlevel")
+    reader_of = sharing(rosbags("highlevel").AnyReader)
     if not path.exists():
         raise InputError(f"{path}: expected a bag, found no such file")
     if not is_bag(path):
@@ -141,9 +141,8 @@ def open_whole(path: Path, stack: ExitStack) -> OpenBag | None:
     if path.is_dir() and not _sound(path):
         return None
     try:
-        reader = highlevel.AnyReader([path], default_typestore=shipped_types("LATEST"))
+        reader = reader_of([path], default_typestore=shipped_types("LATEST"))
         stack.enter_context(reader)
-        reader.typestore = shared(reader.typestore)
         topics = _sum_up((c.topic, c.msgtype, c.msgcount) for c in reader.connections)
     except Exception:  # damaged bags make the library fail in any way; the walk then says what it finds
         return None
