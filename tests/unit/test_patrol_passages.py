@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pilotage.experiments.build.build import build
-from pilotage.experiments.mission import mission_of, read_mission
+from pilotage.experiments.mission import load_mission, mission_of, read_mission
 from pilotage.maps.floor import Floor
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.maps.world_map import WorldMap
@@ -239,3 +239,32 @@ def test_more_robots_than_places_stand_at_them() -> None:
     plan = best_plan(setting, 8, AdaptiveRoundsConfig())
     assert plan.worst_m == 0.0
     assert sorted(plan.sizes) == [2, 3, 3]
+
+
+def test_cells_of_many_points_are_those_of_each() -> None:
+    """Points beyond the floor as well, and on the borders of cells."""
+    floor = Floor.of(with_corridor(), 0.3)
+    rng = np.random.default_rng(0)
+    points = np.vstack([rng.uniform(-3.0, 12.0, (300, 2)), 0.1 * rng.integers(-10, 100, (300, 2))])
+    rows, columns = floor.cells_of(points)
+    assert list(zip(rows.tolist(), columns.tolist(), strict=True)) == [floor.cell_of(p) for p in points]
+
+
+def test_passages_of_a_map_are_followed_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every trial of a study, and a run after its warm-up, searched each edge's path anew."""
+    found: list[float] = []
+    of = Passages.of
+
+    def counted(floor: Floor, graph: PatrolGraph, radius_m: float) -> Passages:
+        found.append(radius_m)
+        return of(floor, graph, radius_m)
+
+    monkeypatch.setattr(Passages, "of", counted)
+    short = ["task.duration_s=10", "run.time_limit_s=10"]
+    one, other, larger = (
+        build(load_mission("museum-patrol", [*short, f"robot.footprint={{radius_m: {radius_m}}}"], seed)).task
+        for radius_m, seed in ((0.3, 1), (0.3, 2), (0.25, 1))
+    )
+    assert found in ([0.3, 0.25], [0.25])  # another test may have met this map
+    assert one.patrol.passages is other.patrol.passages  # type: ignore[attr-defined]
+    assert larger.patrol.passages is not one.patrol.passages  # type: ignore[attr-defined]

@@ -176,6 +176,12 @@ class Floor:
         column = math.floor((float(point_xy_m[0]) - self.origin_xy_m[0]) / self.cell_m)
         return min(max(row, 0), rows - 1), min(max(column, 0), columns - 1)
 
+    def cells_of(self, points_xy_m: FloatArray) -> tuple[IntArray, IntArray]:
+        """Rows (P,) and columns (P,) of the cells that points (P, 2) lie in, clipped to the floor."""
+        rows, columns = self.reachable.shape
+        across, up = np.floor((points_xy_m - self.origin_xy_m) / self.cell_m).astype(np.int64).T
+        return np.clip(up, 0, rows - 1), np.clip(across, 0, columns - 1)
+
     def nearest_cell(self, point_xy_m: FloatArray, what: str = "place") -> tuple[int, int]:
         """The reachable cell nearest to a point, row and column; InputError where none is near."""
         row, column = self.cell_of(point_xy_m)

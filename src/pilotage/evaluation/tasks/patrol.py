@@ -10,6 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from pilotage.core.config import Config
+from pilotage.core.content import content_of
 from pilotage.core.errors import InputError
 from pilotage.core.types import Event, FloatArray
 from pilotage.evaluation.driving import driving_metrics, header
@@ -22,6 +23,7 @@ from pilotage.evaluation.stuck_watch import StuckWatch
 from pilotage.evaluation.tasks.task import TASKS, Attempt, TaskSetting
 from pilotage.evaluation.tasks.team import verdict
 from pilotage.maps.floor import Floor
+from pilotage.maps.known_maps import OncePerMap
 from pilotage.missions.places import GoalConfig
 from pilotage.models.motion.motion import MOTIONS, MotionConfig
 from pilotage.sensors.lidar import LidarConfig
@@ -37,6 +39,8 @@ from pilotage.stack.patrol.tours import Round, idleness_bound_s
 VISITS_EVERY_S, SEE_EVERY_S, LOOK_EVERY_S = 0.2, 0.4, 1.0
 """Lasers see between two looks at everybody: a place that is passed is in view for less than a second."""
 CELL_M = 0.5
+
+_PASSAGES: OncePerMap[Passages] = OncePerMap()
 
 
 class PatrolConfig(Config):
@@ -80,7 +84,11 @@ class PatrolTask:
         # From the vertices of a derived graph the floor is to be seen; at a given place somebody is to be.
         near_m = (0.5 if config.graph is None else 1.0) * config.visit_m
         radius_m = max(footprint.radius_m for footprint in setting.footprints)
-        passages = Passages.of(self._site, graph, radius_m)
+        passages = _PASSAGES.get(
+            setting.chart,
+            content_of(self._site, graph, radius_m),
+            lambda: Passages.of(self._site, graph, radius_m),
+        )
         starts_m = _starts_m(graph, self._site, setting)
         turn_m = max(_turn_m(setting, index, near_m) for index in range(len(self._names)))
         self.patrol = PatrolSite(graph, config.visit_m, near_m, starts_m, passages, turn_m)

@@ -153,7 +153,7 @@ def _parts(
         return []
     at_m = np.linspace(0.0, along_m[-1], 1 + math.ceil(2.0 * along_m[-1] / floor.cell_m))
     places = np.column_stack([np.interp(at_m, along_m, axis) for axis in corners_xy_m.T])
-    numbers = [int(passage[floor.cell_of(place)]) for place in places]
+    numbers = passage[floor.cells_of(places)].tolist()
     parts: list[tuple[int, float, float]] = []
     for number, at in zip(numbers, (at_m * length_m / along_m[-1]).tolist(), strict=True):
         if number == 0:
