@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -63,3 +65,33 @@ def test_an_error_of_which_one_field_is_given_keeps_the_others() -> None:
     config = EkfGaussMarkovConfig.model_validate({"landmark_range_error": {"std": 0.02}})
     assert config.landmark_range_error.std == 0.02
     assert config.landmark_range_error.time_constant_s == 30.0
+
+
+def test_sightings_lie_where_each_move_would_have_carried_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    """They are carried when somebody asks for a pose, to the bit as if it had been done at every move."""
+    rng, recent = np.random.default_rng(3), RecentSightings()
+    laid: list[np.ndarray] = []
+    monkeypatch.setattr(
+        "pilotage.stack.localization.recent_sightings.fix_from_beacons",
+        lambda _, ranges, bearings, *__: laid.append(np.column_stack([ranges, bearings])),
+    )
+    points, seen = rng.uniform(-3.0, 3.0, (4, 2)), list[tuple[float, float, float]]()
+    for k in range(400):
+        t_s = 0.05 * k
+        arc, aside, turn = rng.normal(0.0, 0.1, 3).tolist()
+        recent.move(arc, aside, turn, t_s)
+        c, s = math.cos(0.5 * turn), math.sin(0.5 * turn)
+        dx, dy = arc * c - aside * s, arc * s + aside * c
+        c, s = math.cos(turn), math.sin(turn)
+        moved = [(t, x - dx, y - dy) for t, x, y in seen if t >= t_s - WINDOW_S]
+        seen = [(t, c * x + s * y, -s * x + c * y) for t, x, y in moved]
+        if k % 3 == 0:
+            range_m, bearing_rad = float(rng.uniform(1.0, 5.0)), float(rng.uniform(-1.0, 1.0))
+            recent.add(t_s, k % 4, range_m, bearing_rad, np.zeros(3))
+            seen.append((t_s, range_m * math.cos(bearing_rad), range_m * math.sin(bearing_rad)))
+        if k % 17 == 16:
+            assert recent.fix(points, np.eye(2), 2) is None
+            at = np.array([(x, y) for _, x, y in seen])
+            polar = np.column_stack([np.hypot(*at.T), np.arctan2(at[:, 1], at[:, 0])])
+            assert np.array_equal(laid[-1], polar)
+    assert len(recent._moves) <= WINDOW_S / 0.05 + 2

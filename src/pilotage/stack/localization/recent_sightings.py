@@ -22,6 +22,8 @@ class _Sighting:
     landmark: int
     x_m: float
     y_m: float
+    moved: int
+    """So many of the robot's moves it has been carried along with."""
 
 
 class RecentSightings:
@@ -33,6 +35,8 @@ class RecentSightings:
 
     def __init__(self) -> None:
         self._seen: deque[_Sighting] = deque()
+        self._moves: deque[tuple[float, float, float, float]] = deque()
+        self._moved = 0
 
     def move(self, distance_m: float, lateral_m: float, angle_rad: float, t_s: float) -> None:
         """The robot has moved along an arc, and to its left besides; what is too old is dropped."""
@@ -42,16 +46,27 @@ class RecentSightings:
             return
         half_c, half_s = math.cos(0.5 * angle_rad), math.sin(0.5 * angle_rad)
         dx, dy = distance_m * half_c - lateral_m * half_s, distance_m * half_s + lateral_m * half_c
-        c, s = math.cos(angle_rad), math.sin(angle_rad)
+        self._moves.append((dx, dy, math.cos(angle_rad), math.sin(angle_rad)))
+        self._moved += 1
+        wanted = self._moved - self._seen[0].moved if self._seen else 0
+        while len(self._moves) > wanted:
+            self._moves.popleft()
+
+    def _carry_along(self) -> None:
+        """Lay all sightings where the robot has them now: most are dropped before anybody asks for that."""
+        moves = list(self._moves)
         for sighting in self._seen:
-            x, y = sighting.x_m - dx, sighting.y_m - dy
-            sighting.x_m, sighting.y_m = c * x + s * y, -s * x + c * y
+            x, y = sighting.x_m, sighting.y_m
+            for dx, dy, c, s in moves[len(moves) - (self._moved - sighting.moved) :]:
+                x, y = x - dx, y - dy
+                x, y = c * x + s * y, -s * x + c * y
+            sighting.x_m, sighting.y_m, sighting.moved = x, y, self._moved
 
     def add(self, t_s: float, landmark: int, range_m: float, bearing_rad: float, mount: FloatArray) -> None:
         """Keep a sighting of the sensor at ``mount`` (x, y, theta)."""
         angle = bearing_rad + mount[2]
         x, y = mount[0] + range_m * math.cos(angle), mount[1] + range_m * math.sin(angle)
-        self._seen.append(_Sighting(t_s, landmark, x, y))
+        self._seen.append(_Sighting(t_s, landmark, x, y, self._moved))
 
     def forget(self) -> None:
         """The robot has moved in a way that is not known."""
@@ -72,6 +87,7 @@ class RecentSightings:
         rows = np.array([sighting.landmark for sighting in self._seen], dtype=np.int64)
         if rows.shape[0] < LEAST_READINGS or np.unique(rows).shape[0] < least_landmarks:
             return None
+        self._carry_along()
         at = np.array([(sighting.x_m, sighting.y_m) for sighting in self._seen])
         ranges, bearings = np.hypot(at[:, 0], at[:, 1]), np.arctan2(at[:, 1], at[:, 0])
         fix = fix_from_beacons(points_xy_m[rows], ranges, bearings, _NO_MOUNT, R)
