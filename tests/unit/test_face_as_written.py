@@ -32,7 +32,7 @@ start, goal = (1.0, 1.0), (5.0, 1.0)
 print(pl.plan("map.yaml", start, goal).path.shape)
 print(pl.plan("map.yaml", start, goal, planner="theta-star", clearance_m=0.2).path.shape)
 short = pl.load(mission, set={"run.time_limit_s": 3.0})
-print(pl.study(short, vary={"stack.localizer.gate": [0.9, 0.99]}, trials=2, workers=2).table())
+print(pl.study(short, vary={"stack.localizer.gate": [0.9, 0.99]}, trials=2, workers=1).table())
 ranges = [2.0] * 90
 box = [[0, 0, 6, 0], [6, 0, 6, 4], [6, 4, 0, 4], [0, 4, 0, 0], [3, 0, 3, 2.5]]
 filter = pl.filters.EkfLandmarks(landmarks=[[4.0, 0.0], [0.0, 3.0]])
