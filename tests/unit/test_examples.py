@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.py"))
-FEWER = {"compare_filters": ["2"], "romi_five_panels": ["0", "60"]}
+FEWER = {"compare_filters": ["2"], "romi_five_panels": ["0", "20"]}
 """Seeds, or a seed and seconds: what an example is asked for that does the same again and again."""
 
 
