@@ -32,6 +32,12 @@ Reader = Callable[[Path], object]
 RNG = np.random.default_rng(7)
 
 
+def anew(path: Path, data: bytes | bytearray | str) -> None:
+    """Write a file, not over the last one, for which a file system waits until it is on the disk."""
+    path.unlink(missing_ok=True)
+    path.write_bytes(data.encode() if isinstance(data, str) else data)
+
+
 def rows(*columns: Callable[[int], float], separator: str = " ", count: int = 12) -> str:
     """Fixed-point numbers, as loggers write them."""
     return "".join(separator.join(f"{c(i):.6f}" for c in columns) + "\n" for i in range(count))
@@ -76,7 +82,7 @@ def test_a_text_cut_at_any_byte(tmp_path: Path, name: str) -> None:
     assert judged(reader, path) is not None
     ends = {i for i, letter in enumerate(text) if letter == "\n"}
     for cut in range(len(text)):
-        path.write_text(text[:cut])
+        anew(path, text[:cut])
         if judged(reader, path) is not None and name != "carmen.log":
             whole = cut in ends or cut - 1 in ends
             assert whole or text[:cut].count("\n") < 5, f"half a number was read, cut at byte {cut}"
@@ -88,7 +94,7 @@ def test_a_compressed_text_cut_at_any_byte(tmp_path: Path, name: str) -> None:
     path = tmp_path / name
     packed = gzip.compress(text.encode(), mtime=0)
     for cut in range(0, len(packed), 3):
-        path.write_bytes(packed[:cut])
+        anew(path, packed[:cut])
         # A recording of scans is of use without its end: see below.
         assert judged(reader, path) is None or name == "carmen.log"
     path.write_bytes(packed)
@@ -104,7 +110,7 @@ def test_a_gzipped_recording_cut_in_half_is_read_up_to_the_cut(tmp_path: Path) -
     ]
     packed, path = gzip.compress("".join(lines).encode(), mtime=0), tmp_path / "carmen.log.gz"
     for cut in (len(packed) // 2, len(packed) - 1):
-        path.write_bytes(packed[:cut])
+        anew(path, packed[:cut])
         log = read_laser_log(path)
         assert len(log) > 0.9 * 400 * cut / len(packed)
         np.testing.assert_allclose(log.ranges_m, drawn[: len(log)], atol=1e-4)
@@ -188,7 +194,7 @@ def test_a_mrclam_file_cut_at_any_byte(tmp_path: Path, folder: Path, name: str) 
     head = data.index(b"\n") + 1
     # All of the first lines, and of the rest a byte in 19: every column of some line.
     for cut in [*range(head + 120), *range(head + 120, len(data), 19)]:
-        path.write_bytes(data[:cut])
+        anew(path, data[:cut])
         read = judged(lambda _: read_mrclam(tmp_path / "cut", 1), path)
         if read is not None:
             assert cut > head
@@ -278,14 +284,14 @@ def test_a_matlab_file_cut_or_damaged_anywhere(tmp_path: Path, name: str, packed
     data = path.read_bytes()
     assert judged(reader, path) is not None
     for cut in range(0, len(data), 7):
-        path.write_bytes(data[:cut])
+        anew(path, data[:cut])
         assert judged(reader, path) is None
     rng = np.random.default_rng(1)
     for _ in range(200):
         damaged = bytearray(data)
         for at in rng.integers(0, len(data), 3):
             damaged[at] = rng.integers(256)
-        path.write_bytes(damaged)
+        anew(path, damaged)
         judged(reader, path)
 
 
