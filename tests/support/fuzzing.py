@@ -50,5 +50,6 @@ def damaged_case(target: Target, healthy: Healthy, to: Path, rng: random.Random)
     path = folder / rng.choice(target.files)
     if rng.random() < NO_FILE_SHARE:
         return f"{path.name}: {damage.no_file(path, rng)}"
-    path.write_bytes(damage.damaged(path.read_bytes(), rng, target.trees))
+    damaged = damage.damaged(path.read_bytes(), rng, target.trees)
+    damage.put(path, damaged)
     return f"{path.name}: damaged"

@@ -350,8 +350,8 @@ def small_bags(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
 def test_damaged_bytes_are_one_line_or_a_log(tmp_path: Path, small_bags: dict[str, bytes], form: str) -> None:
     """No other error than ours, whatever bytes are changed and wherever the file ends."""
     suffix = ".bag" if form in {"ros1", "ros1-bz2", "ros1-lz4"} else ".db3" if "sqlite" in form else ".mcap"
-    path = tmp_path / f"a{suffix}"
     for seed in range(20):
+        path = tmp_path / f"{seed}{suffix}"  # to write over the last one waits for the disk
         rng = np.random.default_rng(seed)
         whole = bytearray(small_bags[form])
         for _ in range(rng.integers(1, 9)):
