@@ -168,7 +168,7 @@ def test_plays_a_run_of_3000_steps_smoothly_without_asking_outside(browser: Brow
         " setTimeout(() => done(p.frames / offered), 2500); })"
     )
     # Against the frames that the browser offered meanwhile: how many those are is the machine's affair.
-    assert max(browser.js(f"{PLAYER}.seek(0) || {measure}") for _ in range(3)) >= LEAST_SHARE_OF_FRAMES
+    assert any(browser.js(f"{PLAYER}.seek(0) || {measure}") >= LEAST_SHARE_OF_FRAMES for _ in range(3))
     browser.js(f"{PLAYER}.play(false)")
     asked = [
         e["params"]["request"]["url"] for e in browser.events if e["method"] == "Network.requestWillBeSent"
