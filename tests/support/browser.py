@@ -58,10 +58,20 @@ class Browser:
         self._number = 0
         self.events: list[dict[str, Any]] = []
         self._session: str | None = None
-        target = self.call("Target.createTarget", url="about:blank")["targetId"]
-        self._session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
+        self._target: str | None = None
+        self.begin()
+
+    def begin(self) -> Browser:
+        """Leave the page for an empty one that knows nothing of it."""
+        self._session, before = None, self._target
+        self._target = self.call("Target.createTarget", url="about:blank")["targetId"]
+        if before is not None:
+            self.call("Target.closeTarget", targetId=before)
+        found = self.call("Target.attachToTarget", targetId=self._target, flatten=True)
+        self._session, self.events = found["sessionId"], []
         for domain in ("Page", "Runtime", "Network", "Log"):
             self.call(f"{domain}.enable")
+        return self
 
     def __enter__(self) -> Browser:
         return self

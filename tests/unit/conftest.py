@@ -14,6 +14,7 @@ from pilotage.experiments.studies import local_workers
 from pilotage.experiments.studies.engine import run_study
 from pilotage.experiments.studies.options import StudyOptions
 from support import hostile_trials
+from support.browser import Browser, find_browser
 from support.hostile_studies import study_of
 
 
@@ -44,6 +45,21 @@ def _giver(place: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
 
     give()
     return give
+
+
+@pytest.fixture(scope="session")
+def _chromium() -> Iterator[Browser]:
+    program = find_browser()
+    if program is None:
+        pytest.skip("no Chromium is installed: pages are not tried in a browser")
+    with Browser(program) as browser:
+        yield browser
+
+
+@pytest.fixture(scope="module")
+def browser(_chromium: Browser) -> Browser:
+    """A browser with an empty page; the program is the same for all modules."""
+    return _chromium.begin()
 
 
 @pytest.fixture

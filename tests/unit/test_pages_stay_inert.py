@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator
 from importlib import resources
 from pathlib import Path
 
@@ -11,7 +10,7 @@ import pytest
 import yaml
 
 from pilotage.report import write_report
-from support.browser import Browser, find_browser
+from support.browser import Browser
 from support.fabricated_run import fabricate_metrics, fabricate_run
 from support.fuzz_targets import BY_NAME, QUICK, Target
 from support.outcome import run
@@ -85,16 +84,11 @@ def of_published_courses(folder: Path) -> tuple[str, ...]:
 
 
 @pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    program = find_browser()
-    if program is None:
-        pytest.skip("no Chromium is installed: pages with markup in their names are not tried in a browser")
-    with Browser(program) as browser:
-        browser.call(
-            "Page.addScriptToEvaluateOnNewDocument",
-            source="window.struck = 0; window.alert = () => { window.struck += 1; };",
-        )
-        yield browser
+def browser(browser: Browser) -> Browser:
+    """In it, scripts that run are counted."""
+    source = "window.struck = 0; window.alert = () => { window.struck += 1; };"
+    browser.call("Page.addScriptToEvaluateOnNewDocument", source=source)
+    return browser
 
 
 @pytest.mark.parametrize(

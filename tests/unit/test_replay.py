@@ -6,7 +6,6 @@ import base64
 import json
 import math
 import zlib
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -26,7 +25,7 @@ from pilotage.report.replay.section import replay_section
 from pilotage.sensors.beacon import BeaconConfig
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import BeaconReadings, LidarScan, Readings
-from support.browser import Browser, find_browser
+from support.browser import Browser
 from support.fabricated_run import fabricate_run
 
 PLAYER = 'document.getElementById("replay-player").player'
@@ -134,15 +133,6 @@ def test_long_runs_are_thinned_and_say_so(tmp_path: Path) -> None:
 def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     events = [{"t_s": 100.0, "kind": "replan", "text": "</script><b>no way</b>"}]
     return write_report(replayable_run(tmp_path_factory.mktemp("replay") / "run", events=events))
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    program = find_browser()
-    if program is None:
-        pytest.skip("no Chromium is installed: the replay is not tried in a browser")
-    with Browser(program) as browser:
-        yield browser
 
 
 def centre(browser: Browser, name: str) -> tuple[float, float]:

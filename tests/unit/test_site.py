@@ -15,7 +15,7 @@ from xml.etree import ElementTree
 import pytest
 
 import pilotage as pl
-from support.browser import Browser, find_browser
+from support.browser import Browser
 
 pytest.importorskip("mkdocs", reason="needs the extra 'docs'")
 pytest.importorskip("material", reason="needs the extra 'docs'")
@@ -61,25 +61,19 @@ def site(maker: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return built
 
 
-def test_a_site_opened_from_its_files_searches(site: Path) -> None:
-    program = find_browser()
-    if program is None:
-        pytest.skip("no Chromium is installed: the site's search is not tried in a browser")
-    with Browser(program) as browser:
-        browser.size(1280, 900)
-        browser.call("Emulation.setFocusEmulationEnabled", enabled=True)
-        for page in ("index.html", "decisions/index.html"):
-            browser.open(
-                site / page, f"document.readyState === 'complete' && location.href.endsWith('{page}')"
-            )
-            where = "document.querySelector('.md-search__input').getBoundingClientRect()"
-            browser.wait(f"{where}.width > 0")
-            x, y = browser.js(f"(() => {{ const r = {where}; return [r.x + r.width / 2, r.y + 5]; }})()")
-            browser.mouse("mousePressed", x, y)
-            browser.mouse("mouseReleased", x, y)
-            browser.call("Input.insertText", text="particle filte")
-            browser.key("r", "r")
-            browser.wait("document.querySelector('.md-search-result').innerText.includes('matching')")
+def test_a_site_opened_from_its_files_searches(site: Path, browser: Browser) -> None:
+    browser.size(1280, 900)
+    browser.call("Emulation.setFocusEmulationEnabled", enabled=True)
+    for page in ("index.html", "decisions/index.html"):
+        browser.open(site / page, f"document.readyState === 'complete' && location.href.endsWith('{page}')")
+        where = "document.querySelector('.md-search__input').getBoundingClientRect()"
+        browser.wait(f"{where}.width > 0")
+        x, y = browser.js(f"(() => {{ const r = {where}; return [r.x + r.width / 2, r.y + 5]; }})()")
+        browser.mouse("mousePressed", x, y)
+        browser.mouse("mouseReleased", x, y)
+        browser.call("Input.insertText", text="particle filte")
+        browser.key("r", "r")
+        browser.wait("document.querySelector('.md-search-result').innerText.includes('matching')")
 
 
 def test_no_link_is_dead_and_nothing_is_fetched(site: Path) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,7 +20,7 @@ from pilotage.report.figures.terrain_estimate import rover_error_figure
 from pilotage.report.figures.terrain_map import close_up_figure
 from pilotage.report.replay.section import LONG_SPEEDS, replay_section
 from pilotage.report.replay.terrain import GREYS, SHARES, ground_raster, terrain_scene
-from support.browser import Browser, find_browser
+from support.browser import Browser
 
 PLAYER = 'document.getElementById("replay-player").player'
 READY = 'document.getElementById("replay-player")?.player'
@@ -178,15 +177,6 @@ def test_long_runs_are_told_in_hours_and_play_in_about_a_minute(estimated: Path)
     chosen = next(s for s in LONG_SPEEDS if f'value="{s:.0f}" selected' in section)
     assert 30.0 < scene.t_s[-1] / chosen < 200.0
     assert "ten minutes" in section
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    program = find_browser()
-    if program is None:
-        pytest.skip("no Chromium is installed: the replay is not tried in a browser")
-    with Browser(program) as browser:
-        yield browser
 
 
 def test_in_a_browser(browser: Browser, estimated: Path) -> None:
