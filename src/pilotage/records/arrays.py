@@ -53,12 +53,10 @@ class Arrays:
     def finite(self, name: str, *shape: int, most: float = FARTHEST_M) -> FloatArray:
         """Float64 of a shape, all within ``most``."""
         out = self._of(name, "fiub", shape).astype(np.float64)
-        return np.asarray(require_numbers(out, most, name))
-
-    def any_floats(self, name: str) -> FloatArray:
-        """Float64 of whatever shape it has."""
-        found = self._arrays.get(name)
-        return self.floats(name, *(() if found is None else found.shape))
+        try:
+            return np.asarray(require_numbers(out, most, name))
+        except InputError as error:  # who asks knows the file, and names it
+            raise ValueError(str(error)) from None
 
     def scalar(self, name: str, otherwise: float | None = None) -> float:
         """One number."""

@@ -15,10 +15,12 @@ from pilotage.core.errors import InputError
 from pilotage.core.limits import DATA_BYTES
 from pilotage.core.types import FloatArray
 from pilotage.records.arrays import read_arrays, write_arrays
+from pilotage.records.calibration_answers import ANSWERS, require_answer
+from pilotage.records.calibration_arrays import require_arrays
 from pilotage.records.metrics import clean
 from pilotage.records.reading import broken, cleaned, is_there, object_of, text_of
 
-KINDS = ("odometry", "range", "heading", "commands")
+KINDS = tuple(ANSWERS)
 CALIBRATION_FILE, DATA_FILE, PARAMETER_FILE = "calibration.json", "data.npz", "parameters.yaml"
 SETS_FILE = "sets.yaml"
 
@@ -82,14 +84,19 @@ def read_calibration(folder: Path) -> CalibrationData:
     answer = cleaned(object_of(path, "a calibration"))
     if answer.get("calibration") not in KINDS:
         raise InputError(f"{path}: expected a calibration, found something else")
+    try:
+        require_answer(answer)
+    except ValueError as error:
+        raise _damaged(path, error) from None
     archive = read_arrays(folder / DATA_FILE, DATA_BYTES)
     if archive is None:
         raise InputError(f"{folder}: expected a calibration folder, found no {DATA_FILE} in it")
     try:
-        arrays = {name: archive.any_floats(name) for name in archive.names()}
-        endless = [name for name, values in arrays.items() if bool(np.isinf(values).any())]
-        if endless:
-            raise ValueError(f"{endless[0]}: expected finite numbers")
+        arrays = require_arrays(archive, answer)
     except ValueError as error:
-        raise broken(folder / DATA_FILE, error) from None
+        raise _damaged(folder / DATA_FILE, error) from None
     return CalibrationData(folder, answer, arrays, text_of(folder / PARAMETER_FILE, "a parameter file"))
+
+
+def _damaged(path: Path, problem: object) -> InputError:
+    return InputError(str(broken(path, problem)).replace("run the mission again", "calibrate again"))

@@ -87,6 +87,7 @@ def _camera(data: CalibrationData) -> Illustration:
     over.set_ylim(0.8 * middle, 1.2 * middle)
     left = log_ratio - np.log(scale) - power * log_cosine
     near = np.abs(left) < 0.1
+    near |= not near.any()  # where the fit is that far off, all of it is shown
     histogram(spread, 100.0 * left[near])
     caption = (
         f"{a['readings']} readings: straight ahead {scale:.4f} of the true range "
