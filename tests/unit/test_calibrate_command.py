@@ -240,6 +240,7 @@ def test_what_cannot_be_calibrated_is_refused_in_one_line(tmp_path: Path, capsys
         (("range", "--sensor", "odometry"), "--sensor and --wheel-base are for 'calibrate odometry'"),
         (("heading", "--wheel-base", "0.2"), "--sensor and --wheel-base are for 'calibrate odometry'"),
         (("odometry", "--axis", "z"), "--axis is for 'calibrate heading'"),
+        (("odometry", "--truth", "/truth"), "expected bags where topics are named, found no recordings"),
         (("heading", "--axis", "q"), "unknown --axis 'q'; known: x, y, z"),
     ],
 )

@@ -56,6 +56,8 @@ def odometry_from(
     """Calibrate odometry from bags, CSV files, folders of them and run folders, or drive the runs first."""
     given = None
     if not places:
+        if truth or topics:  # before any run is driven for nothing
+            raise InputError("calibrate odometry: expected bags where topics are named, found no recordings")
         folders, given = drive_odometry_runs(overrides, seed, out)
         places = folders
     logs = _unique([log for place in places for log in _odometry_logs(place, topics, truth)])
