@@ -90,6 +90,17 @@ class Mine(Config):
 class Astar:
     "Mine."
 """
+REGISTERS = """
+from pilotage.core.config import Config
+from pilotage.stack.planning.planner import PLANNERS
+class Mine(Config):
+    "Nothing."
+class Planner:
+    "Mine."
+    def plan(self, request):
+        "Nothing."
+PLANNERS.add({name}, {config})({what})
+"""
 TAKEN_METRIC = """
 from pilotage.evaluation.metric import Metric
 from pilotage.evaluation.metrics import METRICS
@@ -105,6 +116,14 @@ METRICS.add(Metric("duration_s", "mine", "s", ""))
         ("x = 1\n\ny = x / 0\n", "line 3: ZeroDivisionError: division by zero"),
         ("def broken(:\n    pass\n", "line 1: SyntaxError"),
         ("raise SystemExit(3)\n", "line 1: SystemExit: 3"),
+        ("raise GeneratorExit\n", "line 1: GeneratorExit"),
+        ("class Odd(BaseException):\n    pass\nraise Odd('no')\n", "line 3: Odd: no"),
+        (REGISTERS.format(name="'mine'", config="Mine", what="3"), "'mine': expected a class, found int 3"),
+        (REGISTERS.format(name="'mine'", config="Mine", what="len"), "'mine': expected a class, found"),
+        (REGISTERS.format(name="'mine'", config="int", what="Planner"), "derives from Config, found int"),
+        (REGISTERS.format(name="'mine'", config="{}", what="Planner"), "derives from Config, found dict {}"),
+        (REGISTERS.format(name="''", config="Mine", what="Planner"), "expected a name, a text that is not"),
+        (REGISTERS.format(name="3", config="Mine", what="Planner"), "expected a name, a text that is not"),
         (TAKEN, "planner 'astar': expected a new name, found it registered already"),
         (TAKEN_METRIC, "metric 'duration_s': expected a new key, found it declared already"),
         (None, "expected a Python file, found none there"),
@@ -124,6 +143,15 @@ def test_a_plugin_that_cannot_be_used_is_one_line(
         assert told in answer.err
         assert f"plugin '{file}'" in answer.err
     assert str(file) not in plugins.named_plugins()
+    assert set(tmp_path.iterdir()) <= {file}
+
+
+@pytest.mark.usefixtures("alone")
+def test_a_plugin_leaves_no_compiled_copy_beside_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "dont_write_bytecode", False)
+    (tmp_path / "mine.py").write_text("x = 1\n")
+    plugins.load_file(str(tmp_path / "mine.py"))
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.py"]
 
 
 BUGGY = """
@@ -201,6 +229,7 @@ class MyController:
             "expected a Belief of finite pose and positive covariance (3, 3), found Belief with cov nan",
         ),
         ("localizer", BAD_LOCALIZER.format(gives="sys.exit(0)"), "line 16: SystemExit: 0"),
+        ("localizer", BAD_LOCALIZER.format(gives="(_ for _ in ()).throw(GeneratorExit)"), ": GeneratorExit"),
         ("localizer", BAD_LOCALIZER.format(gives="open('/none/x')"), "line 16: FileNotFoundError: "),
         ("controller", BAD_CONTROLLER, ": step: expected a Control of finite numbers, found Twist("),
     ],

@@ -138,9 +138,9 @@ def _run(arguments: list[str], struck: list[KeyboardInterrupt]) -> int:
         code = dispatch(arguments)
         sys.stdout.flush()
         return code
-    except BrokenPipeError:
+    except (BrokenPipeError, KeyboardInterrupt):
         raise
-    except (Exception, SystemExit) as error:
+    except BaseException as error:
         # C code may drop an interruption for an error of its own, which tells nothing of it.
         stopped = interruption_in(error) or (struck[0] if struck else None)
         if stopped is not None:

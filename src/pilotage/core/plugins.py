@@ -13,6 +13,7 @@ import traceback
 from collections.abc import Iterable, Mapping
 from contextlib import redirect_stdout
 from dataclasses import dataclass
+from importlib.machinery import SourceFileLoader
 from importlib.metadata import entry_points
 from pathlib import Path
 
@@ -97,6 +98,13 @@ def load_plugins() -> None:
                 sys.stderr.write(f"pilotage: {shown(line)}\n")
 
 
+class _Unwritten(SourceFileLoader):
+    """Leaves no compiled copy beside a file that was only to be read."""
+
+    def set_data(self, *_: object, **__: object) -> None:
+        """Where Python would write ``__pycache__``."""
+
+
 def load_file(path: str) -> None:
     """Import one plugin file, once a process.
 
@@ -111,7 +119,7 @@ def load_file(path: str) -> None:
         beside = hint_beside(Path(path), {".py"})
         raise InputError(f"plugin '{path}': expected a Python file, found none there{beside}")
     name = f"pilotage_plugin_{len(_loaded)}_{Path(path).stem}"
-    spec = importlib.util.spec_from_file_location(name, path)
+    spec = importlib.util.spec_from_file_location(name, path, loader=_Unwritten(name, path))
     if spec is None or spec.loader is None:
         raise InputError(f"plugin '{path}': expected a Python file, found something else")
     module = importlib.util.module_from_spec(spec)
@@ -120,7 +128,9 @@ def load_file(path: str) -> None:
     try:
         with redirect_stdout(sys.stderr):  # standard output may be for one JSON object alone
             spec.loader.exec_module(module)
-    except (Exception, SystemExit) as error:
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
         # Asked for once more it is refused once more.
         del _loaded[path], sys.modules[name]
         told = str(error) if isinstance(error, InputError) else _where(error, path)

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
-from pilotage.core.checked import Gives, checked
+from pilotage.core.checked import Gives, checked, told
 from pilotage.core.config import Config, validate
 from pilotage.core.errors import InputError, unknown_name
 from pilotage.core.plugins import giver, load_plugins, take
@@ -56,6 +56,7 @@ class Registry(Generic[T]):
         """Register the decorated class under ``name`` with its config model."""
 
         def register(cls: C) -> C:
+            self._require_kinds(name, cls, config)
             if not cls.__module__.startswith("pilotage."):
                 self._load()  # so that who comes from outside and takes a name of ours is the one refused
             if name in self._entries:
@@ -67,6 +68,18 @@ class Registry(Generic[T]):
             return cls
 
         return register
+
+    def _require_kinds(self, name: object, cls: object, config: object) -> None:
+        """What a plugin hands in may be anything."""
+        if not isinstance(name, str) or not name.strip():
+            raise InputError(f"{self.role}: expected a name, a text that is not empty, found {told(name)}")
+        if not isinstance(cls, type):
+            raise InputError(f"{self.role} '{name}': expected a class, found {told(cls)}")
+        if not isinstance(config, type) or not issubclass(config, Config):
+            found = config.__name__ if isinstance(config, type) else told(config)
+            raise InputError(
+                f"{self.role} '{name}': expected a config, a class that derives from Config, found {found}"
+            )
 
     def add_config(self, name: str) -> Callable[[C], C]:
         """Register a class that is its own config: one whose description is all there is to it."""
