@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from pilotage.core.drafts import clear_drafts, draft_prefix
+from pilotage.core.errors import InputError
 
 
 @contextmanager
@@ -23,7 +25,14 @@ def named(path: Path, draft: Path) -> Iterator[None]:
 
 @contextmanager
 def draft_of(path: Path) -> Iterator[Path]:
-    """A draft that takes the place of ``path`` when it is whole: two processes may write at once."""
+    """A draft that takes the place of ``path`` when it is whole: two processes may write at once.
+
+    Raises
+    ------
+    InputError
+        Where something stands there that is no file, such as ``/dev/null``.
+    """
+    _require_place(path)
     draft = path.with_name(f"{draft_prefix(path)}draft")
     try:
         with named(path, draft):
@@ -41,8 +50,22 @@ def write_whole(path: Path, text: str) -> None:
 
     Raises
     ------
-    OSError
-        Where it cannot be written; what stood there before stays as it was.
+    InputError, OSError
+        Where no file can stand or be written; what stood there before stays as it was.
     """
     with draft_of(path) as draft:
         draft.write_text(text, encoding="utf-8", errors="replace")
+
+
+def _require_place(path: Path) -> None:
+    """Only a file gives way to another: who may do anything would rename the draft over a device as well.
+
+    Links are followed: ``/dev/stdout`` leads to a terminal or a pipe, and is everybody's.
+    """
+    try:
+        mode = path.stat().st_mode
+    except OSError:  # nothing is there, or the writing will tell what is wrong
+        return
+    if not stat.S_ISREG(mode):
+        found = "a folder" if stat.S_ISDIR(mode) else "a device, a pipe or a socket"
+        raise InputError(f"{path}: expected a place for a file, found {found}")
