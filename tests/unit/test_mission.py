@@ -267,8 +267,10 @@ def test_an_obstacle_on_the_start_is_refused() -> None:
         place_obstacles([box], ROOM, Pose2(2.0, 2.2, 0.0), None, None, 0.3, np.random.default_rng(0))
 
 
-def test_an_obstacle_without_room_is_refused() -> None:
-    trap = TrapObstacle(kind="u-trap", width_m=(30.0, 31.0))
+@pytest.mark.parametrize("width_m", [30.0, 1e9])
+def test_an_obstacle_without_room_is_refused(width_m: float) -> None:
+    """Also one that would be walked over for ever to look for walls beneath it."""
+    trap = TrapObstacle(kind="u-trap", width_m=(width_m, width_m + 1.0))
     path = PATH[:40] * np.array([0.2, 0.2, 1.0])
     with pytest.raises(InputError, match="make it smaller"):
         place_obstacles(

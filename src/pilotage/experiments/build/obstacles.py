@@ -217,14 +217,16 @@ def _free_of_walls(sides: FloatArray, world: SegmentMap) -> bool:
     corners = np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
     hull = corners @ frame.T
     xmin, ymin, xmax, ymax = world.bounds_m
-    inside = (hull >= [xmin, ymin]).all() and (hull <= [xmax, ymax]).all()
+    # First, since it bounds the walk: one of a kilometre has thousands of millions of points.
+    if not ((hull >= [xmin, ymin]).all() and (hull <= [xmax, ymax]).all()):
+        return False
     # Walk over the rectangle finely enough that no wall slips between the points.
     steps = np.ceil((high - low) / 0.1).astype(int) + 1
     grid = np.stack(
         np.meshgrid(np.linspace(low[0], high[0], steps[0]), np.linspace(low[1], high[1], steps[1])), axis=-1
     ).reshape(-1, 2)
     least = plane.least_distance(np.ascontiguousarray(grid @ frame.T), world.segments_m, world.circles_m)
-    return bool(inside and least > 0.1)
+    return bool(least > 0.1)
 
 
 def _passable(world: SegmentMap, start: Pose2, goal: Goal) -> bool:
