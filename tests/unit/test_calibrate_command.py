@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from collections.abc import Callable
 from html import unescape
 from pathlib import Path
 from typing import Any
@@ -135,6 +136,16 @@ def test_logs_of_a_folder_are_taken_together(tmp_path: Path, capsys: Capture) ->
     assert parameters["robot"]["sensors"]["wheels"]["distance_scale"] == pytest.approx(1.05, abs=5e-3)
     check_page(Path(answer["report"]), figures=3)
     assert main(["report", answer["calibration_dir"]]) == 0
+
+
+def test_a_full_disk_leaves_no_half_of_a_folder(
+    small_disk: Callable[[str], Path], tmp_path: Path, capsys: Capture
+) -> None:
+    log, disk = odometry_log(tmp_path / "a.csv", seed=1), small_disk("8k")
+    said = refused(capsys, "odometry", str(log), "--out", str(disk / "runs"), "--no-report")
+    assert f"{disk}/runs/calibrate-odometry-" in said
+    assert "No space left on device" in said
+    assert not list(disk.iterdir())
 
 
 def test_the_same_logs_give_the_same_folder(tmp_path: Path, capsys: Capture) -> None:

@@ -225,6 +225,19 @@ def test_bad_options_leave_nothing_behind(
     assert not out.exists()
 
 
+def test_a_full_disk_leaves_nothing_behind(
+    filmed: Filmed, small_disk: Callable[[str], Path], capfd: pytest.CaptureFixture[str]
+) -> None:
+    film, disk = filmed(FilmScript(frames=4)), small_disk("16k")
+    capfd.readouterr()
+    assert main(["track", str(film), "--out", str(disk / "new" / "out")]) == 2
+    error = capfd.readouterr().err
+    assert error.count("\n") == 1
+    assert error.startswith(f"pilotage: {disk}/new/out/")
+    assert error.endswith(": No space left on device\n")
+    assert not list(disk.iterdir())
+
+
 @pytest.mark.parametrize("kind", ["missing", "empty", "text", "noise", "blank"])
 def test_films_without_a_map_are_refused_in_one_line(
     kind: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]

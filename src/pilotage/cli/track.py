@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Annotated
 
@@ -13,6 +13,7 @@ import typer
 
 from pilotage.cli.options import Json
 from pilotage.cli.output import print_columns, print_json, print_line
+from pilotage.core.whole_file import made_folder
 
 
 def track(
@@ -63,22 +64,19 @@ def track(
     with _progress("learning") as advance:
         scene = learn_scene(film, options, advance)
     folder = None if out is None else Path(out)
-    writer = None
-    if folder is not None:
-        folder.mkdir(parents=True, exist_ok=True)
-        writer = AnnotatedFilm(folder, scene)
-    done = False
-    try:
-        with _progress("tracking") as advance:
-            result = follow(film, scene, writer, advance)
-        done = True
-    finally:
-        if writer is not None:
-            writer.close(keep=done)
-        if folder is not None and not done:
-            with suppress(OSError):  # it held something before: leave it
-                folder.rmdir()
-    written = [] if folder is None else write_track(folder, result)
+    written: list[Path] = []
+    with nullcontext() if folder is None else made_folder(folder):
+        writer = None if folder is None else AnnotatedFilm(folder, scene)
+        done = False
+        try:
+            with _progress("tracking") as advance:
+                result = follow(film, scene, writer, advance)
+            if folder is not None:
+                written = write_track(folder, result)
+            done = True
+        finally:
+            if writer is not None:
+                writer.close(keep=done)
     values = result.as_dict()
     broke = scene.film.broke_at_frame
     if broke is not None:

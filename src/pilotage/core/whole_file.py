@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import stat
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from pilotage.core.drafts import clear_drafts, draft_prefix
@@ -21,6 +21,20 @@ def named(path: Path, draft: Path) -> Iterator[None]:
         if error.errno is None or not (told is None or str(told).startswith(str(draft))):
             raise
         raise OSError(error.errno, error.strerror or str(error), str(path)) from error
+
+
+@contextmanager
+def made_folder(folder: Path) -> Iterator[None]:
+    """A folder to write into; where that fails, those that were made for it are gone again."""
+    made = [place for place in (folder, *folder.parents) if not place.exists()]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        yield
+    except BaseException:
+        with suppress(OSError):  # somebody else has written into one of them already
+            for place in made:
+                place.rmdir()
+        raise
 
 
 @contextmanager

@@ -13,6 +13,7 @@ from pilotage.core import given
 from pilotage.core.given import FilePath
 from pilotage.core.interruptions import interruptible
 from pilotage.core.types import FloatArray
+from pilotage.core.whole_file import made_folder
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,8 +92,8 @@ def track(
     found = follow(film, learn_scene(film, options))
     written: tuple[Path, ...] = ()
     if folder is not None:
-        folder.mkdir(parents=True, exist_ok=True)
-        written = tuple(write_track(folder, found))
+        with made_folder(folder):
+            written = tuple(write_track(folder, found))
     answer = found.as_dict()
     rows = [(entry["t_s"], entry["x_m"], entry["y_m"]) for entry in answer["path"]]
     return Tracked(answer, np.array(rows, dtype=np.float64).reshape(-1, 3), written)

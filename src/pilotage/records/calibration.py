@@ -19,6 +19,7 @@ from pilotage.records.calibration_answers import ANSWERS, require_answer
 from pilotage.records.calibration_arrays import require_arrays
 from pilotage.records.metrics import clean
 from pilotage.records.reading import broken, cleaned, is_there, object_of, text_of
+from pilotage.records.run_folder import draft_folder
 
 KINDS = tuple(ANSWERS)
 CALIBRATION_FILE, DATA_FILE, PARAMETER_FILE = "calibration.json", "data.npz", "parameters.yaml"
@@ -51,17 +52,16 @@ def write_calibration(
     for key in sorted(data):
         digest.update(np.ascontiguousarray(data[key]).tobytes())
     folder = out / f"calibrate-{answer['calibration']}-{digest.hexdigest()[:8]}"
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, text in texts.items():
-        (folder / name).write_text(text, encoding="utf-8", errors="replace")
     named: dict[str, Any] = {**answer, "calibration_dir": str(folder)}
     if PARAMETER_FILE in texts:
         named["parameter_file"] = str(folder / PARAMETER_FILE)
     if SETS_FILE in texts:
         named["sets_file"] = str(folder / SETS_FILE)
-    write_arrays(folder / DATA_FILE, data)
-    # Last: a folder with this file is whole.
-    (folder / CALIBRATION_FILE).write_text(json.dumps(clean(named), indent=2) + "\n", encoding="utf-8")
+    with draft_folder(folder) as draft:
+        for name, text in texts.items():
+            (draft / name).write_text(text, encoding="utf-8", errors="replace")
+        write_arrays(draft / DATA_FILE, data)
+        (draft / CALIBRATION_FILE).write_text(json.dumps(clean(named), indent=2) + "\n", encoding="utf-8")
     return named, folder
 
 

@@ -6,13 +6,13 @@ import os
 import shutil
 import tempfile
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 from pilotage.core.drafts import clear_drafts, draft_prefix
 from pilotage.core.types import Event
-from pilotage.core.whole_file import named
+from pilotage.core.whole_file import made_folder, named
 from pilotage.maps.occupancy_grid import OccupancyGrid
 from pilotage.maps.ros_map import RosMap, write_ros_map
 from pilotage.records.cells import SheetData, write_cells
@@ -126,23 +126,19 @@ def draft_folder(final: Path) -> Iterator[Path]:
     Everything is written beside it first, so that two runs at once do not mix and an interrupted one leaves
     nothing half-written, nor the folders that were made for it.
     """
-    made = [folder for folder in final.parents if not folder.exists()]
-    final.parent.mkdir(parents=True, exist_ok=True)
     begin = draft_prefix(final)
-    with named(final, final.with_name(begin)):
-        draft = Path(tempfile.mkdtemp(prefix=begin, dir=final.parent))
-    try:
-        draft.chmod(0o777 & ~_umask())
-        with named(final, draft):
-            yield draft
-            replace_folder(draft, final)
-        clear_drafts(final)
-    except BaseException:
-        shutil.rmtree(draft, ignore_errors=True)
-        with suppress(OSError):  # another run is in one of them already
-            for folder in made:
-                folder.rmdir()
-        raise
+    with made_folder(final.parent):
+        with named(final, final.with_name(begin)):
+            draft = Path(tempfile.mkdtemp(prefix=begin, dir=final.parent))
+        try:
+            draft.chmod(0o777 & ~_umask())
+            with named(final, draft):
+                yield draft
+                replace_folder(draft, final)
+            clear_drafts(final)
+        except BaseException:
+            shutil.rmtree(draft, ignore_errors=True)
+            raise
 
 
 def _umask() -> int:

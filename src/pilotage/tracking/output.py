@@ -7,11 +7,13 @@ import io
 import json
 import queue
 import threading
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 from pilotage.core.errors import InputError
 from pilotage.core.hushed import hushed
+from pilotage.core.whole_file import draft_of
 from pilotage.maps.cell_map_text import features_only, format_cell_map
 from pilotage.tracking.drawing import Annotator, top_view
 from pilotage.tracking.film import Image
@@ -100,11 +102,10 @@ def write_track(folder: Path, track: Track) -> list[Path]:
         "visited_map.txt": format_cell_map(track.cells).encode(),
         "map.png": png.tobytes(),
     }
-    written = []
-    for name, content in contents.items():
-        (folder / name).write_bytes(content)
-        written.append(folder / name)
-    return written
+    with ExitStack() as drafts:  # all of them take their places, or none
+        for name, content in contents.items():
+            drafts.enter_context(draft_of(folder / name)).write_bytes(content)
+    return [folder / name for name in contents]
 
 
 def _csv(rows: list[dict[str, Any]]) -> str:
