@@ -12,7 +12,9 @@ import numpy as np
 import pytest
 
 from pilotage.cli.main import main
+from pilotage.experiments.barn_benchmark import led_by
 from pilotage.experiments.barn_bounds import has_way
+from pilotage.experiments.values import parse_override
 from pilotage.logs.barn import START, BarnWorld, path_clearance_m
 
 KEYS = {
@@ -184,3 +186,11 @@ def test_whether_there_is_a_way_is_said_for_the_true_outline(gap_m: float, fits:
     world = BarnWorld(0, circles, np.array([[-2.25, 3.0], [-2.25, 13.0]]), 10.0, 5.0)
     assert has_way(world, JACKAL) is fits
     assert path_clearance_m(world) == pytest.approx(0.5 * gap_m)
+
+
+@pytest.mark.parametrize("name", ["dwa", """it's "new": <1>""", "null", "\u202ex"])
+def test_a_controller_of_any_name_is_the_one_that_drives(name: str) -> None:
+    """A plugin may call its controller as it likes; quotes in it were no YAML."""
+    first, second = led_by(name, ("a.b=1",))
+    assert parse_override(first) == (["stack", "local_controller", "name"], name)
+    assert second == "a.b=1"

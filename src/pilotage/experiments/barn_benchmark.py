@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -180,7 +181,7 @@ def led_by(controller: str, overrides: tuple[str, ...]) -> tuple[str, ...]:
         raise InputError(
             "--set stack.local_controller.name: expected no name, found one; say --controller NAME"
         )
-    return (f"stack.local_controller.name={controller}", *overrides)
+    return (f"stack.local_controller.name={json.dumps(controller)}", *overrides)
 
 
 def drive_world(request: BarnRequest, base: Values, world: BarnWorld, trial: int, controller: str) -> BarnRun:
