@@ -16,6 +16,7 @@ from pilotage.core.errors import InputError
 from pilotage.core.limits import DEPTH, NUMBER_LENGTH, VALUES, limit, too_large
 
 _PARSER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+_UNKNOWN_TAG = re.compile(r"could not determine a constructor for the tag '(?:tag:yaml\.org,2002:|!)?(.*)'")
 _HALF_PAIR = re.compile("[\ud800-\udfff]")
 _NUMBERS = frozenset({"tag:yaml.org,2002:int", "tag:yaml.org,2002:float"})
 # What PyYAML's constructors stumble over where a tag and its text do not belong together.
@@ -44,6 +45,7 @@ def load_yaml(text: str, where: str) -> Any:
         # The C parser counts one line more at the end of the text.
         line = f" line {min(mark.line, text.count(chr(10))) + 1}" if mark is not None else ""
         problem = getattr(error, "problem", None) or str(error) or "not YAML"
+        problem = _UNKNOWN_TAG.sub(r"the tag '!!\1', which has no meaning here", problem)
         raise InputError(f"{where}{line}: expected YAML, found: {problem}") from None
     except (ValueError, OverflowError) as error:  # a date that is none
         raise InputError(f"{where}: expected YAML, found: {error}") from None

@@ -100,7 +100,8 @@ def read_aer1513(path: Path) -> Aer1513Log:
 def _array(path: Path, content: dict[str, object], name: str) -> FloatArray:
     values = np.asarray(content[name])
     if values.dtype.kind not in "fiu":
-        raise InputError(f"{path}: {name}: expected numbers, found {values.dtype}")
+        found = "cells or a structure" if values.dtype.kind == "O" else values.dtype
+        raise InputError(f"{path}: {name}: expected numbers, found {found}")
     return values.astype(np.float64)
 
 

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from pilotage.core.checked import told
 from pilotage.core.errors import InputError
 from pilotage.core.files import read_json_lines
 from pilotage.core.types import Event
@@ -40,14 +41,14 @@ def read_events(folder: Path) -> tuple[Event, ...]:
 
 
 def _event(entry: Mapping[str, Any], path: Path) -> Event:
-    kind, text = entry.get("kind"), entry.get("text")
-    if "t_s" not in entry or not isinstance(kind, str) or not isinstance(text, str):
+    if not {"t_s", "kind", "text"} <= set(entry):
         found = ", ".join(str(key) for key in entry) or "nothing in it"
         raise InputError(f"{path}: expected objects with t_s, kind and text, found one with {found}")
+    kind, text = (_word(entry, name, path) for name in ("kind", "text"))
     t_s = number(entry["t_s"])
     if entry["t_s"] is not None and not math.isfinite(t_s):
         raise InputError(f"{path}: expected the time of an event in seconds, found something else")
-    return Event(t_s, clean_text(kind), clean_text(text))
+    return Event(t_s, kind, text)
 
 
 def require_times(events: Iterable[Event], folder: Path) -> None:
@@ -63,3 +64,10 @@ def require_times(events: Iterable[Event], folder: Path) -> None:
             f"{folder / EVENTS_FILE}: expected the time of every event in seconds, 0 to {LATEST_S}, "
             "found one without"
         )
+
+
+def _word(entry: Mapping[str, Any], name: str, path: Path) -> str:
+    value = entry[name]
+    if not isinstance(value, str):
+        raise InputError(f"{path}: {name}: expected a text, found {told(value)}")
+    return clean_text(value)

@@ -14,6 +14,7 @@ import numpy as np
 
 from pilotage.core.errors import InputError
 from pilotage.core.files.plain import opened, require_file
+from pilotage.core.files.words import in_words
 from pilotage.core.limits import DATA_BYTES, limit, too_large
 
 Array = np.ndarray[tuple[int, ...], np.dtype[Any]]
@@ -49,7 +50,7 @@ def map_npy(path: Path, what: str = "a .npy file") -> Array:
     try:
         return np.memmap(path, dtype, "r", at, shape, "F" if fortran else "C")
     except (OSError, ValueError) as error:
-        raise InputError(f"{path}: expected a NumPy array, found: {error}") from None
+        raise InputError(f"{path}: expected a NumPy array, found: {in_words(error)}") from None
 
 
 def read_npy(path: Path, what: str = "a .npy file") -> Array:
@@ -78,7 +79,7 @@ def read_npz(path: Path, what: str = "an .npz file", most: int = DATA_BYTES) -> 
         except InputError:
             raise
         except _DAMAGED as error:
-            raise InputError(f"{path}: expected {what}, found: {error or 'damaged data'}") from None
+            raise InputError(f"{path}: expected {what}, found: {in_words(error)}") from None
 
 
 def _arrays(archive: zipfile.ZipFile, where: str, most: int) -> dict[str, Array]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from pilotage.core.errors import InputError
 from pilotage.core.files.plain import opened
+from pilotage.core.files.words import in_words
 from pilotage.core.hushed import hushed
 from pilotage.core.limits import DATA_BYTES, limit, too_large
 
@@ -47,6 +48,6 @@ def opened_image(path: Path, what: str = "an image") -> Iterator[Image.Image]:
         except UnidentifiedImageError:
             raise InputError(f"{where}: expected a PNG, PGM or other image, found another format") from None
         except (*_DAMAGED, Image.DecompressionBombError) as error:
-            raise InputError(f"{where}: cannot be read ({error}); it may be cut short") from None
+            raise InputError(f"{where}: cannot be read ({in_words(error)}); it may be cut short") from None
         finally:
             Image.MAX_IMAGE_PIXELS = guard
