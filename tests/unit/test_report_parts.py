@@ -26,6 +26,7 @@ from pilotage.report.figures.layers import ellipse_outlines
 from pilotage.report.figures.map_view import view_limits
 from pilotage.report.figures.placing import LabelPlacer, along
 from pilotage.report.headline import headline
+from pilotage.report.markup import Html, escape, table
 from pilotage.report.series import band, decimate, merge_spans, running_mean, spans
 from support.fabricated_run import fabricate_metrics, fabricate_run, fabricate_world
 from support.pages import page_of
@@ -65,6 +66,15 @@ def test_the_headline_tells_what_the_mission_was_about() -> None:
     seen = headline(team | {"detected": True, "detection_time_s": 18.1}).replace("\u00a0", " ")
     assert seen == "All 2 robots succeeded; the intruder was detected 18.1 s after he came in."
     assert "the intruder was not detected" in headline(team | {"detected": False})
+
+
+def test_text_on_a_page_turns_no_direction_and_breaks_where_it_is_too_long() -> None:
+    assert escape("a<b\u202egnp\x1b[0m\tc\u200cd") == "a&lt;b\ufffdgnp\ufffd[0m\tc\u200cd"
+    made = table(
+        (("name", "row"), ("value", "")), [("<" * 90 + " " + "b" * 40, Html("<i>" + "c" * 90 + "</i>"))]
+    )
+    assert f"{'&lt;' * 40}<wbr>{'&lt;' * 40}<wbr>{'&lt;' * 10} {'b' * 40}</th>" in made
+    assert f"<i>{'c' * 90}</i>" in made
 
 
 def test_quantities_are_humane() -> None:

@@ -7,15 +7,16 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from importlib import resources
+from itertools import pairwise
 from string import Template
 
 from pilotage.core.types import Event
+from pilotage.records.reading import clean_text
 from pilotage.report import quantities
 from pilotage.report.event_kinds import event_kind
 from pilotage.report.metrics_table import Row
 from pilotage.report.style import Illustration, Key
 
-escape = html.escape
 REPORT_FILE = "report.html"
 """Every page's name, in the folder that it is about."""
 VALUE, PLAIN, ROW = "value", "value plain", "row"
@@ -23,6 +24,8 @@ VALUE, PLAIN, ROW = "value", "value plain", "row"
 WHOLE = 9
 """Characters of a cell that stay on one line."""
 _BEFORE_UNIT = re.compile(r"(?<=\d) (?=(?:[kmµ]?m|m?s|min|h|%|m?rad|m/s|rad/s|Hz)(?!\w))")
+_LONG = re.compile(r"\S{40}(?=\S)")
+"""As much of a word as has to stay together in a table; a longer one would push all numbers out of sight."""
 Columns = Sequence[tuple[str, str]]
 """Headings, each with how its cells look."""
 
@@ -40,6 +43,11 @@ class Section:
     slug: str
     title: str
     html: str
+
+
+def escape(text: str) -> str:
+    """Text as markup; marks that would turn the direction of what follows, and control characters, show."""
+    return html.escape(clean_text(text))
 
 
 def section(slug: str, title: str, *parts: str) -> Section:
@@ -88,7 +96,10 @@ def _cell(text: str, look: str) -> str:
 
 
 def _escaped(text: str) -> str:
-    return text if isinstance(text, Html) else escape(text)
+    if isinstance(text, Html):
+        return text
+    ends = [0, *(found.end() for found in _LONG.finditer(text)), len(text)]
+    return "<wbr>".join(escape(text[a:b]) for a, b in pairwise(ends))
 
 
 def _whole(text: str) -> str:
