@@ -101,6 +101,7 @@ class Planner:
         "Nothing."
 PLANNERS.add({name}, {config})({what})
 """
+MUTE = "class Mute(Exception):\n    def __str__(self):\n        return 1 / 0\n"
 TAKEN_METRIC = """
 from pilotage.evaluation.metric import Metric
 from pilotage.evaluation.metrics import METRICS
@@ -116,6 +117,7 @@ METRICS.add(Metric("duration_s", "mine", "s", ""))
         ("x = 1\n\ny = x / 0\n", "line 3: ZeroDivisionError: division by zero"),
         ("def broken(:\n    pass\n", "line 1: SyntaxError"),
         ("raise SystemExit(3)\n", "line 1: SystemExit: 3"),
+        (MUTE + "raise Mute()\n", "line 4: Mute: without a text that can be shown"),
         ("raise GeneratorExit\n", "line 1: GeneratorExit"),
         ("class Odd(BaseException):\n    pass\nraise Odd('no')\n", "line 3: Odd: no"),
         (REGISTERS.format(name="'mine'", config="Mine", what="3"), "'mine': expected a class, found int 3"),

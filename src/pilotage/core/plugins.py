@@ -158,7 +158,7 @@ def fault_of(error: BaseException) -> Fault | None:
     place = f"line {last.lineno}" if last.filename == home else f"{last.filename} line {last.lineno}"
     told = "".join(traceback.format_exception_only(error)).strip()
     text = "Traceback of the plugin (most recent call last):\n" + "".join(traceback.format_list(own)) + told
-    return Fault(f"plugin {homes[home]} {place}: {type(error).__name__}: {error}", text)
+    return Fault(f"plugin {homes[home]} {place}: {_named(error)}", text)
 
 
 def take(module: str) -> None:
@@ -235,4 +235,13 @@ def _where(error: BaseException, path: str = "") -> str:
     lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == path]
     number = error.lineno if isinstance(error, SyntaxError) else (lines[-1] if lines else None)
     place = "" if number is None else f"line {number}: "
-    return f"{place}{type(error).__name__}: {error}"
+    return f"{place}{_named(error)}"
+
+
+def _named(error: BaseException) -> str:
+    """An error's kind and text; one of a plugin's own may be unable to tell."""
+    try:
+        text = str(error)
+    except Exception:
+        text = "without a text that can be shown"
+    return f"{type(error).__name__}: {text}"
