@@ -79,6 +79,8 @@ VALUES: tuple[Any, ...] = (
     -1,
     1,
     2,
+    1000.0,
+    1e9,
     1e308,
     -1e308,
     1e-320,
@@ -277,6 +279,9 @@ WHOLE: dict[str, Content] = {
     "a huge number": b"1" * 100_000,
     "a document after another": b"a: 1\n---\nb: 2\n",
     "NaN": b'{"a": NaN}',
+    "a picture's header without numbers": b"P5\nx 20\n255\n",
+    "a tag of one's own": b"a: !mine {b: 1}\n",
+    "an event without a text": b'{"t_s": 1.0, "kind": 3, "text": null}\n',
     "beyond all doubles": b'{"a": 1e999, "b": 123456789012345678901234567890}',
     "ps": b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 10 10\n",
     "a thousand columns": (",".join(f"c{i}_m" for i in range(1000)) + "\n").encode()
