@@ -20,7 +20,8 @@ def test_it_parks(seed: int) -> None:
     metrics = run_mission(load_mission("car-park", seed=seed), save=False).metrics
     assert metrics["success"], metrics["reason"]
     assert metrics["collisions"] == 0
-    assert float(str(metrics["goal_error_m"])) <= 0.15
+    # The last piece is backwards: wheels that were turned to the wrong side at rest made it 4 mm.
+    assert float(str(metrics["goal_error_m"])) <= 0.002
     assert float(str(metrics["min_clearance_m"])) > 0.0
 
 

@@ -109,7 +109,8 @@ def laid_out(
             columns = tuple(np.interp(middle_s, s, column) for column in columns)
             s, curvature = middle_s, np.repeat(curvature, 2)
         x, y, theta = (float(column[0]) for column in columns)
-        first_w = sign[first] * math.copysign(1e-3, curvature[0]) if abs(curvature[0]) > ABRUPT_PER_M else 0.0
+        # At rest wheels turn to the side that is asked for: backwards the robot then turns to the other one.
+        first_w = math.copysign(1e-3, curvature[0]) if abs(curvature[0]) > ABRUPT_PER_M else 0.0
         rows += [[x, y, wrap_to_pi(theta), 0.0, first_w]] * round(pause_s / dt_s)
         limit = _limits(s, curvature, speed_m_s, curvature_rate_per_m_s, turn_rate_rad_s)
         rows += _timed(
