@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from pilotage.core.random import RandomStreams
-from pilotage.core.types import FloatArray, Pose2, Twist
+from pilotage.core.types import STOP, FloatArray, Pose2, Twist
 from pilotage.experiments.loop import simulate
 from pilotage.experiments.mission import mission_of, read_mission
 from pilotage.experiments.run import run_mission
@@ -250,6 +250,20 @@ def test_a_robot_in_a_door_makes_room_for_who_presses_and_stays_out_in_the_open(
         assert gap_m > ROBOT.radius_m
     assert pose.x_m < -0.6
     assert gap_m > 0.85
+
+
+@pytest.mark.parametrize("beside_m", [0.42, 0.7])
+def test_who_has_corners_makes_room_only_where_they_touch_nothing_as_it_turns(beside_m: float) -> None:
+    """A forklift that was shut in among mates turned on the spot, and its corner into the nearest one."""
+    corners = np.array([[0.45, 0.3], [-0.45, 0.3], [-0.45, -0.3], [0.45, -0.3]])
+    robot = replace(ROBOT, footprint=Footprint.polygon(corners))
+    bodies = MovingBodies(MovingBodiesConfig(), robot, CHART)
+    _watch(bodies, (2.0, 0.0), (-0.5, 0.0))
+    makes_room = MakeRoom(MakeRoomConfig(), robot, CHART.field, bodies)
+    makes_room.begin(0.0)
+    command = makes_room.step(0.0, Pose2(0.0, 0.0, 0.0), np.array([[0.0, beside_m, 0.03]]))
+    assert command is not None
+    assert (command == STOP) == (beside_m < 0.5)
 
 
 def test_what_has_stood_for_long_is_a_thing_until_it_moves() -> None:

@@ -46,7 +46,8 @@ class MakeRoom:
     """Straight to the place in sight with the most room to walls and to people, again and again.
 
     Who stands in a door, beside the end of a wall or in somebody's path waits there with whoever wants to get
-    past, for ever: people do not foresee, and push. A robot that cannot turn on the spot stays where it is.
+    past, for ever: people do not foresee, and push. A robot that cannot turn on the spot stays where it is, and
+    so does one whose corners would touch something or somebody if it turned.
     """
 
     def __init__(
@@ -54,6 +55,7 @@ class MakeRoom:
     ) -> None:
         self._config, self._field, self._bodies = config, field, bodies
         self._radius_m, self._turns = robot.radius_m, robot.motion.least_turning_radius_m == 0.0
+        self._has_corners = not robot.footprint.is_disc
         self._rate_rad_s = min(0.8, robot.motion.top_turn_rate_rad_s)
         self._speed_m_s = min(config.speed_m_s, robot.motion.top_speed_m_s)
         self._to: tuple[float, float] | None = None
@@ -88,11 +90,20 @@ class MakeRoom:
             return None
         off_rad = wrap_to_pi(math.atan2(dy, dx) - pose.theta_rad)
         turn = min(max(TURN_GAIN_PER_S * off_rad, -self._rate_rad_s), self._rate_rad_s)
+        if self._has_corners and not self._may_turn(pose, mapped_m):
+            return STOP
         if abs(off_rad) > AHEAD_RAD:
             return Twist(0.0, turn)
         ahead = np.array([[math.cos(pose.theta_rad), math.sin(pose.theta_rad)]])
         free, _ = self._looked_at(pose, mapped_m, ahead, min(away_m, 3.0 * STEP_M))
         return Twist(self._speed_m_s if free.all() else 0.0, turn)
+
+    def _may_turn(self, pose: Pose2, mapped_m: FloatArray) -> bool:
+        """Whether nothing and nobody is within the disc around the robot."""
+        discs = np.concatenate([mapped_m, self._bodies.foretold(NOW_S, 1, pose, mapped_m, self._radius_m)[0]])
+        gaps_m = np.hypot(discs[:, 0] - pose.x_m, discs[:, 1] - pose.y_m) - discs[:, 2]
+        to_wall_m = self._field.at(np.array([[pose.x_m, pose.y_m]]))[0]
+        return bool(min(to_wall_m, gaps_m.min(initial=math.inf)) > self._radius_m)
 
     def _best(self, pose: Pose2, mapped_m: FloatArray) -> tuple[float, float] | None:
         """The place with the most room; None where none within reach is better than here."""
