@@ -93,7 +93,7 @@ def test_wheels_that_turn_slowly_slow_it_down_where_the_curvature_jumps() -> Non
 
 
 def test_wheels_are_turned_at_rest_to_the_side_of_the_arc_that_begins_there() -> None:
-    """Before a piece backwards they were turned to the other side, and the piece began with a bend of its own."""
+    """Before a piece backwards they were turned to the other one: it began with a bend of its own."""
     for goal in ((-1.0, 0.6, -0.9), (1.0, 0.6, 0.9), (-1.0, -0.6, 0.9), (1.0, -0.6, -0.9)):
         rows = laid_out(curve(goal)[0], 0.5, 1.0, 5.0, 0.4, DT_S)
         rests = np.flatnonzero((rows[:-1, 3] == 0.0) & (rows[:-1, 4] != 0.0) & (rows[1:, 3] != 0.0))

@@ -46,8 +46,8 @@ class MakeRoom:
     """Straight to the place in sight with the most room to walls and to people, again and again.
 
     Who stands in a door, beside the end of a wall or in somebody's path waits there with whoever wants to get
-    past, for ever: people do not foresee, and push. A robot that cannot turn on the spot stays where it is, and
-    so does one whose corners would touch something or somebody if it turned.
+    past, for ever: people do not foresee, and push. A robot that cannot turn on the spot stays where it is,
+    and so does one whose corners would touch something or somebody if it turned.
     """
 
     def __init__(

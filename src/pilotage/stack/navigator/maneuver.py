@@ -16,7 +16,8 @@ from pilotage.sensors.readings import Readings
 from pilotage.sensors.sensor import Positive
 from pilotage.stack.control.controller import Controller
 from pilotage.stack.control.kanayama import KanayamaConfig, KanayamaController
-from pilotage.stack.interface import NAVIGATORS, BeliefStatus, StackStatus
+from pilotage.stack.control.own_half import OwnHalf, OwnHalfConfig
+from pilotage.stack.interface import NAVIGATORS, Belief, BeliefStatus, StackStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.navigator.global_plan import GlobalPlan
@@ -26,9 +27,13 @@ from pilotage.stack.navigator.navigator import (
     check_keeps_time,
     localizer_of,
     only_goal,
+    unexplained_of,
 )
+from pilotage.stack.navigator.own_map import OwnMap
+from pilotage.stack.navigator.reference import STANDS, Reference
 from pilotage.stack.navigator.timed_path import laid_out, with_turns
 from pilotage.stack.navigator.trail import Trail
+from pilotage.stack.navigator.yielding import Act, Yielding, YieldingConfig
 from pilotage.stack.planning.planner import Path, PlanResult, PlanStatus
 
 MOST_REPLANS, MOST_RESTS = 8, 3
@@ -39,6 +44,10 @@ BESIDE_INNER_M = (0.25, 0.2, 0.15, 0.08, 0.04, 0.01)
 """What paths planned for the centre keep beside the outline's inner disc, where they can keep no more."""
 HEADING_PER_S = 3.0
 """A heading error dies out in so much of a second's inverse while it turns on the spot."""
+AROUND, BACKING = 0.6, 0.2
+"""Shares of the gap that are kept where it drives around somebody, and where it backs out before him."""
+SEEN_M = 0.05
+"""What is seen and on no map counts as discs of this radius where a path around it is planned."""
 
 
 class ManeuverConfig(Config):
@@ -55,6 +64,10 @@ class ManeuverConfig(Config):
     """Farther from its reference than this it stops and plans anew."""
     tracking: KanayamaConfig = KanayamaConfig(along_per_s=1.0, length_m=0.45)
     """Of the tracking law, where the stack names no controller."""
+    own_half: OwnHalfConfig = OwnHalfConfig()
+    """How near it comes to what its laser sees and its map does not explain."""
+    yielding: YieldingConfig = YieldingConfig()
+    """What it does where that stays in its way."""
 
 
 @NAVIGATORS.add("maneuver", ManeuverConfig)
@@ -63,8 +76,11 @@ class ManeuverNavigator(LocalizingNavigator):
 
     A robot that turns on the spot does so at the path's corners, so that it drives the very lines of a sweep.
 
-    It looks at no obstacle that is not on its map. Where it cannot keep up with the plan it plans anew; what
-    a path that covers a floor left of it, as far as the robot knows, is driven in the end. Lost, it stands.
+    It drives no faster than lets it stop, along its path and with its outline, on its own half of the way to
+    whatever its laser sees that is on no map: team mates, people, things. Where that stays in the way it
+    plans around it, or backs out of the way that it came. Where it cannot keep up with the plan it plans
+    anew; what a path that covers a floor left of it, as far as the robot knows, is driven in the end. Lost,
+    it stands.
     """
 
     def __init__(
@@ -86,13 +102,16 @@ class ManeuverNavigator(LocalizingNavigator):
         self._config, self._robot, self._goal = config, robot, goal
         check_keeps_time(parts, "maneuver")
         self._controller: Controller = parts.controller or KanayamaController(config.tracking, robot)
+        self._mapper, self._mates = parts.mapper, task.mates
+        self._own_map = OwnMap(chart, parts.mapper)
+        self._own_half = OwnHalf(config.own_half, robot, chart, unexplained_of(parts))
+        self._yielding = Yielding(config.yielding, robot.dt_s, robot.streams.stream("yielding"))
         rng = robot.streams.stream("planner")
         self._plan = GlobalPlan(
             parts.planner, parts.smoother, chart, rng, journal, robot=robot, as_planned=True
         )
-        self._references: FloatArray = np.zeros((0, 5))
-        self._to_go_m: FloatArray = np.zeros(0)
-        self._index, self._replans, self._rests = 0, 0, 0
+        self._reference = Reference(np.zeros((0, 5)), robot.dt_s)
+        self._replans, self._rests, self._backs = 0, 0, False
         self._trail: Trail | None = None
         self._think_at_s = 0.0
         if self.belief.status is BeliefStatus.LOST:
@@ -122,31 +141,45 @@ class ManeuverNavigator(LocalizingNavigator):
         self._lay_out(plan.path)
         self._journal.say(t_s, "plan" if t_s == 0.0 else "replan", result.reason)
 
-    def _planned(self, t_s: float, rest: bool = False) -> PlanResult:
-        """What was found from where it believes to be."""
+    def _planned(self, t_s: float, *, rest: bool = False, around: bool = False) -> PlanResult:
+        """What was found from where it believes to be; ``around`` all that it sees, or not at all."""
         trail = None if self._trail is None else self._trail.rows
-        nothing = np.zeros((0, 3))
-        return self._plan.make(
-            t_s, self.belief.pose, self._goal, nothing, self._clearances_m(), trail=trail, rest=rest
-        )
+        found = self._own_map.found_circles_m
+        if around:
+            cells = np.round(self._own_half.seen_m / SEEN_M).astype(np.int64)
+            seen = self._own_half.seen_m[np.unique(cells, axis=0, return_index=True)[1]]
+            found = np.vstack([found, np.column_stack([seen, np.full(len(seen), SEEN_M)])])
+        clearances_m, pose = self._clearances_m(), self.belief.pose
+        if around:
+            # Who can wait as well does not squeeze through where nothing is left beside its outline.
+            some_m = [clearances_m[0], *clearances_m[1:-1][-1:]]
+            result = self._plan.make(t_s, pose, self._goal, found, some_m, trail=trail)
+            if result.status is not PlanStatus.START_BLOCKED:
+                return result
+        result = self._plan.make(t_s, pose, self._goal, found, clearances_m, trail=trail, rest=rest)
+        if result.path is not None or around or rest or not len(found):
+            return result
+        # What it mapped may have gone by the time that it is there: it stops before what has not.
+        return self._plan.make(t_s, pose, self._goal, found[:0], clearances_m, trail=trail)
 
     def _lay_out(self, path: Path) -> None:
         """The reference along a path, from its first row on."""
+        self._lay_out_states(path.states, path.turning_radius_m)
+
+    def _lay_out_states(self, states: FloatArray, turning_radius_m: float) -> None:
         braking = self._robot.motion.braking_m_s2
         acceleration = self._config.acceleration_share * (braking if math.isfinite(braking) else 2.0)
         speed = min(self._config.speed_m_s, self._robot.motion.top_speed_m_s)
-        states, dt_s, motion = path.states, self._robot.dt_s, self._robot.motion
+        dt_s, motion = self._robot.dt_s, self._robot.motion
         turns = motion.least_turning_radius_m == 0.0
         rate = (self._config.turn_share if turns else 1.0) * motion.top_turn_rate_rad_s
-        if path.turning_radius_m == 0.0:
+        if turning_radius_m == 0.0:
             heading = self.belief.pose.theta_rad
-            self._references = with_turns(states, heading, rate, speed, acceleration, dt_s)
+            rows = with_turns(states, heading, rate, speed, acceleration, dt_s)
         else:
             wheels, pause_s = motion.curvature_rate_per_m_s, 0.0 if turns else self._config.pause_s
-            self._references = laid_out(states, speed, acceleration, wheels, pause_s, dt_s, rate)
-        ahead_m = dt_s * np.abs(self._references[::-1, 3]).cumsum()[::-1]
-        self._to_go_m = np.append(ahead_m[1:], 0.0)
-        self._index = 0
+            rows = laid_out(states, speed, acceleration, wheels, pause_s, dt_s, rate)
+        self._reference, self._backs = Reference(rows, dt_s), False
         self._controller.reset()
 
     def _clearances_m(self) -> list[float]:
@@ -174,17 +207,22 @@ class ManeuverNavigator(LocalizingNavigator):
         pose = belief.pose
         if self._trail is not None:
             self._trail.add(self.belief)
-        if self._index >= len(self._references) and self._goes_for_the_rest(readings.t_s):
+        if self._reference.done:
+            self._ends(readings.t_s)
             return STOP
-        if self._index >= len(self._references):
-            self._status = StackStatus.ARRIVED
-            self._journal.say(readings.t_s, "arrived", "the plan was driven to its end")
-            return STOP
-        x, y, theta, v, w = self._references[self._index].tolist()
-        self._channel.tell(x, y, theta, float(self._to_go_m[self._index]))
-        self._index += 1
+        self._heed(readings, belief)
+        speed_m_s = self._reference.speed_m_s
+        x, y, theta, v, w, to_go_m = self._reference.step().tolist()
+        self._channel.tell(x, y, theta, to_go_m)
         if math.hypot(x - pose.x_m, y - pose.y_m) > self._config.astray_m:
             return self._astray(readings.t_s)
+        rate = self._reference.rate
+        act = self._yielding.step(rate, rate * abs(speed_m_s) * self._robot.dt_s, backs=self._backs)
+        self._yielding.drove(np.array([x, y, theta]), backs=self._backs)
+        if act is not Act.NOTHING:
+            return self._yields(readings.t_s, act)
+        if rate == 0.0:
+            return STOP
         if v == 0.0:
             turns = self._robot.motion.least_turning_radius_m == 0.0
             return Twist(0.0, w + HEADING_PER_S * wrap_to_pi(theta - pose.theta_rad) if turns else w)
@@ -192,6 +230,63 @@ class ManeuverNavigator(LocalizingNavigator):
         # The way back along the path is the other direction's: a piece is driven in its own only.
         forward = max(control.twist.v_m_s, 0.0) if v > 0.0 else min(control.twist.v_m_s, 0.0)
         return Twist(forward, control.twist.w_rad_s)
+
+    def _heed(self, readings: Readings, belief: Belief) -> None:
+        """Let the reference's clock run as fast as what the laser sees leaves room for."""
+        if self._mapper is not None:
+            self._mapper.step(readings, belief)
+        half, reference = self._own_half, self._reference
+        half.look(readings, belief, self._own_map.found_circles_m)
+        speed_m_s = abs(reference.speed_m_s)
+        within_m = half.stops_within_m(max(speed_m_s, self._config.speed_m_s))
+        share = BACKING if self._backs else AROUND if self._yielding.tries else 1.0
+        fastest_m_s = half.fastest_m_s(belief.pose, reference.ahead(within_m, half.reacts_s), share)
+        if speed_m_s == 0.0:
+            reference.rate = 1.0 if fastest_m_s > 0.0 else 0.0
+            return
+        motion, dt_s = self._robot.motion, self._robot.dt_s
+        slower = motion.braking_m_s2 * dt_s / speed_m_s
+        rate = min(max(fastest_m_s / speed_m_s, reference.rate - slower), reference.rate + slower, 1.0)
+        if rate < STANDS:
+            rate = 0.0
+        if rate == 0.0 and not self._yielding.is_held:
+            self._journal.count("waits")
+            self._journal.say(readings.t_s, "wait", "somebody or something stands in its way")
+        reference.rate = rate
+
+    def _yields(self, t_s: float, act: Act) -> Twist:
+        """Having been held up for long: around what it sees, or back the way that it came."""
+        if self._yielding.gives_up and not self._mates:
+            self._end(t_s, StackStatus.FAILED, "stuck: something stands in its way, and nothing leads around")
+            return STOP
+        back = self._yielding.way_back() if act is Act.BACK else np.zeros((0, 3))
+        if len(back):
+            self._lay_out_states(back, self._robot.motion.least_turning_radius_m or 1.0)
+            self._backs = True
+            self._journal.say(t_s, "back-out", "backs out the way that it came")
+        else:
+            self._goes_around(t_s)
+        return STOP
+
+    def _goes_around(self, t_s: float) -> bool:
+        """Whether there is a path around all that it sees; then it is taken."""
+        result = self._planned(t_s, around=True)
+        if result.path is None or self._plan.path is None:
+            return False
+        self._lay_out(self._plan.path)
+        self._journal.count("replans")
+        self._journal.say(t_s, "replan", f"around what stands in its way: {result.reason}")
+        return True
+
+    def _ends(self, t_s: float) -> None:
+        """At the path's end: there, or with something left, or where it backed out to."""
+        if self._backs:
+            self._backs = False
+            if not self._goes_around(t_s):
+                self._think(t_s)
+        elif not self._goes_for_the_rest(t_s):
+            self._status = StackStatus.ARRIVED
+            self._journal.say(t_s, "arrived", "the plan was driven to its end")
 
     def _goes_for_the_rest(self, t_s: float) -> bool:
         """Whether what it drove along left something, and there is a path to that."""
@@ -206,6 +301,7 @@ class ManeuverNavigator(LocalizingNavigator):
         return True
 
     def _astray(self, t_s: float) -> Twist:
+        self._yielding.forget()
         self._replans += 1
         if self._replans > MOST_REPLANS:
             self._end(t_s, StackStatus.FAILED, "stuck: it cannot keep to its plans")

@@ -1,0 +1,131 @@
+"""How fast a robot may drive along its path: it can stop on its own half of the way to what is on no map."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pilotage.core.angles import wrap_array_to_pi
+from pilotage.core.config import Config
+from pilotage.core.types import FloatArray, Pose2
+from pilotage.kernels.control.own_half import poses_in_own_half
+from pilotage.maps.world_map import WorldMap
+from pilotage.sensors.lidar import LidarConfig
+from pilotage.sensors.readings import LidarScan, Readings
+from pilotage.sensors.sensor import NonNegative, Positive
+from pilotage.stack.interface import Belief
+from pilotage.stack.knowledge import RobotKnowledge
+from pilotage.stack.perception.unexplained import UnexplainedReturns
+
+LOOK_M = 0.02
+"""Poses along the path are looked at so close together."""
+
+
+class OwnHalfConfig(Config):
+    """What counts as on no map, and what is left between the robot and that."""
+
+    reach_m: Positive = 6.0
+    tolerance_m: Positive = 0.15
+    """Returns nearer than this to a wall are the wall's."""
+    sigmas: NonNegative = 3.0
+    """The tolerance grows with the pose's uncertainty by this many standard deviations."""
+    gap_m: NonNegative = 0.10
+    """Left between both where they come to rest."""
+
+
+class OwnHalf:
+    """Says how fast the robot may be on its path, by the last scan's returns that its map does not explain.
+
+    Whatever returned them may come towards it: it stops on its own half of the way, with its outline, along
+    the path and by the brakes of its data sheet. What no laser sees it does not heed; without exactly one
+    lidar (several that are joined are one) that is all.
+    """
+
+    def __init__(
+        self,
+        config: OwnHalfConfig,
+        robot: RobotKnowledge,
+        chart: WorldMap,
+        unexplained: UnexplainedReturns | None,
+    ) -> None:
+        self._config, self._footprint = config, robot.footprint
+        motion = robot.motion
+        self._braking_m_s2 = min(motion.braking_m_s2, motion.top_speed_m_s / robot.dt_s)
+        lidars = list(robot.sensors_of(LidarConfig).items())
+        self.seen_m: FloatArray = np.zeros((0, 2))
+        """(P, 2) what it heeds, in the map."""
+        self._unexplained: UnexplainedReturns | None = None
+        self._lidar, self.reacts_s = "", robot.dt_s + motion.delay_s
+        if len(lidars) != 1:
+            return
+        self._lidar, lidar = lidars[0]
+        # It is told of what came after a scan with the next one.
+        self.reacts_s = max(robot.dt_s, 1.0 / lidar.rate_hz) + motion.delay_s
+        same = unexplained is not None and (unexplained.tolerance_m, unexplained.sigmas)
+        if unexplained is None or same != (config.tolerance_m, config.sigmas):
+            unexplained = UnexplainedReturns(lidar, chart, config.tolerance_m, config.sigmas)
+        self._unexplained = unexplained
+        unexplained.look_to(config.reach_m)
+
+    def look(self, readings: Readings, belief: Belief, mapped_m: FloatArray) -> None:
+        """Take in a step's scan, if there is one, and what was mapped (M, 3) and may be out of sight."""
+        scan = readings.by_sensor.get(self._lidar)
+        if self._unexplained is None or not isinstance(scan, LidarScan):
+            return
+        seen = self._unexplained.of(scan, belief)
+        reach_m = self._config.reach_m
+        away_m = np.hypot(mapped_m[:, 0] - seen.x_m, mapped_m[:, 1] - seen.y_m)
+        self.seen_m = np.concatenate(
+            [seen.points_m[scan.ranges_m[seen.beams] < reach_m], mapped_m[away_m < reach_m, :2]]
+        )
+
+    def stops_within_m(self, speed_m_s: float) -> float:
+        """How far it gets from a speed, before it reacts and while it brakes."""
+        return speed_m_s * self.reacts_s + 0.5 * speed_m_s**2 / self._braking_m_s2
+
+    def fastest_m_s(self, pose: Pose2, ahead: FloatArray, share: float = 1.0) -> float:
+        """The speed from which it can stop in time on a path; inf where nothing stands to be heeded.
+
+        Parameters
+        ----------
+        pose
+            Where it is; the path begins there, wherever its first row is.
+        ahead
+            (K, 3) of the path from here on, as far as it matters.
+        share
+            Of the gap, for who has to get out of where it stands: corners swing out before they leave.
+        """
+        if not len(self.seen_m) or len(ahead) < 2:
+            return math.inf
+        poses, along_m = _from_here(ahead)
+        clear = poses_in_own_half(
+            poses, self._footprint.points_m, self._footprint.radius_m, _seen_from(pose, self.seen_m),
+            share * self._config.gap_m,
+        )  # fmt: skip
+        if clear == len(poses):
+            return math.inf
+        clear_m = float(along_m[max(clear - 1, 0)])
+        braking, reacts_s = self._braking_m_s2, self.reacts_s
+        return braking * (math.sqrt(reacts_s**2 + 2.0 * clear_m / braking) - reacts_s)
+
+
+def _from_here(ahead: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Poses (K, 3) along a path seen from its first one, close together, and how far along it they are."""
+    step_m = np.hypot(*np.diff(ahead[:, :2], axis=0).T)
+    turned = np.concatenate([[0.0], np.cumsum(wrap_array_to_pi(np.diff(ahead[:, 2])))])
+    c, s = math.cos(ahead[0, 2]), math.sin(ahead[0, 2])
+    offset = ahead[:, :2] - ahead[0, :2]
+    poses = np.column_stack([offset @ np.array([c, s]), offset @ np.array([-s, c]), turned])
+    along_m = np.concatenate([[0.0], np.cumsum(step_m)])
+    if not along_m[-1] > 0.0:
+        return poses, along_m
+    at_m = np.linspace(0.0, along_m[-1], math.ceil(along_m[-1] / LOOK_M) + 1)
+    return np.column_stack([np.interp(at_m, along_m, column) for column in poses.T]), at_m
+
+
+def _seen_from(pose: Pose2, points_m: FloatArray) -> FloatArray:
+    """Points (P, 2) of the map in the base frame."""
+    c, s = math.cos(pose.theta_rad), math.sin(pose.theta_rad)
+    offset = points_m - np.array([pose.x_m, pose.y_m])
+    return np.column_stack([offset @ np.array([c, s]), offset @ np.array([-s, c])])

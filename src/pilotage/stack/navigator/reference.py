@@ -1,0 +1,80 @@
+"""A path laid out in time, whose clock runs slower where the robot has to wait."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from pilotage.core.angles import wrap_array_to_pi
+from pilotage.core.types import FloatArray
+
+STANDS = 0.02
+"""A clock slower than this stands."""
+
+
+class Reference:
+    """Rows of ``timed_path.laid_out``: where to be at the end of each step, and with which speeds.
+
+    Attributes
+    ----------
+    rate
+        How fast its clock runs; 1: by the layout.
+    """
+
+    def __init__(self, rows: FloatArray, dt_s: float) -> None:
+        self._rows, self._dt_s = rows, dt_s
+        self._at, self.rate = 0.0, 1.0
+        ahead_m = dt_s * np.abs(rows[::-1, 3]).cumsum()[::-1]
+        self._to_go_m = np.append(ahead_m, 0.0)
+
+    @property
+    def done(self) -> bool:
+        """Whether it was driven to its end."""
+        return self._at >= len(self._rows)
+
+    @property
+    def speed_m_s(self) -> float:
+        """Of the layout here, negative backwards."""
+        return 0.0 if self.done else float(self._rows[int(self._at), 3])
+
+    def ahead(self, within_m: float, within_s: float) -> FloatArray:
+        """(K, 3) from where the reference is, in one direction, as far as this or to where it rests.
+
+        Of a turn on the spot as much as is made in ``within_s``.
+        """
+        first = int(self._at)
+        rows = self._rows[max(first - 1, 0) :]
+        speeds = rows[1:, 3] if first else rows[:, 3]
+        if not len(speeds):
+            return self._pose()[None, :]
+        direction = float(np.sign(speeds[0]))
+        if direction == 0.0:
+            count = min(int(np.argmax(np.append(speeds, 1.0) != 0.0)), math.ceil(within_s / self._dt_s))
+        else:
+            count = int(np.argmax(np.append(speeds * direction, -1.0) <= 0.0))
+            along_m = self._dt_s * np.abs(speeds[:count]).cumsum()
+            count = min(count, int(np.searchsorted(along_m, within_m)) + 1)
+        return np.vstack([self._pose(), self._rows[first : first + count, :3]])
+
+    def step(self) -> FloatArray:
+        """Move on by a step of its clock: (6,) pose, speed, turn rate and the way to go from there."""
+        row = self._rows[int(self._at)]
+        v, w = self.rate * row[3], self.rate * row[4]
+        self._at = min(self._at + self.rate, float(len(self._rows)))
+        if len(self._rows) - self._at < STANDS:
+            self._at = float(len(self._rows))
+        to_go_m = np.interp(self._at, np.arange(len(self._to_go_m)), self._to_go_m)
+        return np.array([*self._pose(), v, w, to_go_m])
+
+    def _pose(self) -> FloatArray:
+        """(3,) where it is: a row's pose at the end of its step."""
+        after = self._at - 1.0
+        first = max(math.floor(after), 0)
+        pose = self._rows[min(first, len(self._rows) - 1), :3].copy()
+        share = after - first
+        if share > 0.0 and first + 1 < len(self._rows):
+            following = self._rows[first + 1, :3]
+            pose[:2] += share * (following[:2] - pose[:2])
+            pose[2:] = wrap_array_to_pi(pose[2:] + share * wrap_array_to_pi(following[2:] - pose[2:]))
+        return pose
