@@ -69,6 +69,7 @@ class Journal:
     update: ExplainableUpdate | None = None
     silenced: bool = False
     _results: dict[str, Callable[[], object]] = field(default_factory=dict)
+    _by_the_way: set[str] = field(default_factory=set)
     _channels: list[Channel] = field(default_factory=list)
 
     def say(self, t_s: float, kind: str, text: str) -> None:
@@ -112,14 +113,18 @@ class Journal:
         self._channels.append(Channel(self.row, begin, begin + len(columns)))
         return self._channels[-1]
 
-    def result(self, name: str, make: Callable[[], object]) -> None:
-        """Offer something that is wanted once, at the end of the run: a map, what was found."""
+    def result(self, name: str, make: Callable[[], object], *, by_the_way: bool = False) -> None:
+        """Offer something that is wanted once, at the end of the run: a map, what was found.
+
+        ``by_the_way``: by a part that makes it for its own use, whatever the robot is to do.
+        """
         self._results[name] = make
+        (self._by_the_way.add if by_the_way else self._by_the_way.discard)(name)
 
     @property
     def offered(self) -> frozenset[str]:
-        """The names of what is offered."""
-        return frozenset(self._results)
+        """The names of what is offered, but for what is so by the way."""
+        return frozenset(self._results) - self._by_the_way
 
     def results(self) -> dict[str, object]:
         """Everything offered, made now."""

@@ -61,7 +61,7 @@ class SlamLocalizer:
         self.belief = initial
         self._channel = journal.channel(COLUMNS)
         self._channel.tell(0.0, 0.0)
-        journal.result("grid", self.scan_grid.grid)
+        journal.result("grid", self.scan_grid.grid, by_the_way=True)
 
     def step(self, readings: Readings) -> Belief:
         """Move by the odometry, and align the scan where there is one."""
