@@ -72,7 +72,7 @@ def test_who_explores_nothing_is_refused_before_it_drives() -> None:
     """It drove to the end, and then its judge missed the map."""
     with pytest.raises(InputError, match=r"makes cells and left and visited, .* found 'open-loop'"):
         build(load_mission("romi-explore", ["stack.navigator=open-loop", "run.oracles=[localizer]"], 0))
-    # On a floor its localizer makes a grid, for its own use: who drives by the clock explored nothing with it.
+    # On a floor its localizer makes a grid, for its own use: who drives by the clock explored nothing.
     with pytest.raises(InputError, match=r"makes grid, .* found 'open-loop'"):
         build(load_mission("museum-unknown", ["stack.navigator=open-loop"], 0))
 
