@@ -14,9 +14,13 @@ from pilotage.core.types import FloatArray
 from pilotage.experiments.mission import load_mission, mission_of
 from pilotage.experiments.run import run_mission
 from pilotage.kernels.control.own_half import poses_in_own_half
-from pilotage.models.footprint import NO_CORNERS
+from pilotage.kernels.rrt.hybrid import poses_that_fit
+from pilotage.maps.distance_field import DistanceField
+from pilotage.maps.segment_map import SegmentMap
+from pilotage.models.footprint import NO_CORNERS, Footprint
 from pilotage.stack.navigator.reference import Reference
 from pilotage.stack.navigator.yielding import Act, Yielding, YieldingConfig
+from pilotage.stack.planning.outline import car_of, ground_of
 
 CORNERS = np.array([[0.8, 0.3], [-0.2, 0.3], [-0.2, -0.3], [0.8, -0.3]])
 RADIUS_M = math.hypot(0.8, 0.3)
@@ -189,3 +193,26 @@ def test_two_cars_that_meet_in_a_corridor_both_arrive(half_width_m: float) -> No
     metrics = run_mission(mission_of(_two_cars(half_width_m), seed=3), save=False).metrics
     assert metrics["success"], metrics["reason"]
     assert metrics["collisions"] == 0
+
+
+@pytest.mark.parametrize("dt_s", [0.02, 0.5])
+def test_however_long_its_steps_a_car_is_not_astray_where_it_should_be(dt_s: float) -> None:
+    """It was held against where it should be at the end of the step: 0.25 m off in steps of half a second."""
+    values = _two_cars(0.9)
+    values["robots"] = values["robots"][:1]
+    values["run"] = {"time_limit_s": 120, "dt_s": dt_s}
+    for sensor in values["robot"]["sensors"].values():
+        sensor["rate_hz"] = min(10.0, 1.0 / dt_s)
+    metrics = run_mission(mission_of(values, seed=1), save=False).metrics
+    assert metrics["success"], metrics["reason"]
+    assert metrics.get("replans", 0) == 0
+
+
+def test_poses_fit_until_one_comes_nearer_than_the_first_that_does_not_fit() -> None:
+    field = DistanceField.from_map(SegmentMap.of(np.array([[-3.0, 0.5, 3.0, 0.5], [-3.0, -2.0, 3.0, -2.0]])))
+    car = car_of(Footprint.polygon(CORNERS), 0.25, 1.0)
+    ground = ground_of(field, car)
+    along = np.column_stack([np.linspace(-1.0, 1.0, 9), np.zeros((9, 2))])
+    assert poses_that_fit(along, 1e-3, car, ground) == 9
+    assert poses_that_fit(along + 0.01 * np.arange(9)[:, None] * [0, 1, 0], 1e-3, car, ground) == 1
+    assert poses_that_fit(along - 0.01 * np.arange(9)[:, None] * [0, 1, 0], 1e-3, car, ground) == 9

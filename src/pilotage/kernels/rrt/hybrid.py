@@ -127,6 +127,22 @@ def arc_fits(
 
 
 @kernel
+def poses_that_fit(states: FloatArray, nearer: float, car: Car, ground: Space) -> int:
+    """How many of the poses (N, 3), one after the other, keep the clearance.
+
+    Of one that does not at the first of them the others come no nearer than that one, but for ``nearer``.
+    """
+    least = 0.0
+    for i in range(states.shape[0]):
+        spare = spare_at(states[i, 0], states[i, 1], states[i, 2], car, ground)
+        if i == 0:
+            least = min(spare, 0.0) - nearer
+        elif spare < least:
+            return i
+    return int(states.shape[0])
+
+
+@kernel
 def path_fits(states: FloatArray, turns: bool, car: Car, ground: Space) -> bool:
     """Whether the outline fits along states (N, 3) and between them; ``turns``: on the spot at bends."""
     for i in range(states.shape[0]):

@@ -1,4 +1,4 @@
-"""How fast a robot may drive along its path: it can stop on its own half of the way to what is on no map."""
+"""How fast a robot may drive along its path: it can stop before walls, and in its own half of all else."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ from pilotage.core.angles import wrap_array_to_pi
 from pilotage.core.config import Config
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.kernels.control.own_half import poses_in_own_half
+from pilotage.kernels.rrt import hybrid
+from pilotage.kernels.rrt.clearance import Space
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, Readings
@@ -18,6 +20,8 @@ from pilotage.stack.interface import Belief
 from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.perception.unexplained import UnexplainedReturns
 
+NEARER_M = 1e-3
+"""Who is nearer to a wall, as it believes, may be by so much more."""
 LOOK_M = 0.02
 """Poses along the path are looked at so close together."""
 
@@ -38,8 +42,9 @@ class OwnHalf:
     """Says how fast the robot may be on its path, by the last scan's returns that its map does not explain.
 
     Whatever returned them may come towards it: it stops on its own half of the way, with its outline, along
-    the path and by the brakes of its data sheet. What no laser sees it does not heed; without exactly one
-    lidar (several that are joined are one) that is all.
+    the path and by the brakes of its data sheet. From the walls of its map it stops where it would touch
+    them, beside its path as it is. What no laser sees it does not heed; without exactly one lidar (several
+    that are joined are one) walls are all.
     """
 
     def __init__(
@@ -48,11 +53,13 @@ class OwnHalf:
         robot: RobotKnowledge,
         chart: WorldMap,
         unexplained: UnexplainedReturns | None,
+        walls: tuple[hybrid.Car, Space],
     ) -> None:
         self._config, self._footprint = config, robot.footprint
         motion = robot.motion
         self._braking_m_s2 = min(motion.braking_m_s2, motion.top_speed_m_s / robot.dt_s)
         lidars = list(robot.sensors_of(LidarConfig).items())
+        self._car, self._ground = walls
         self.seen_m: FloatArray = np.zeros((0, 2))
         """(P, 2) what it heeds, in the map."""
         self._unexplained: UnexplainedReturns | None = None
@@ -84,7 +91,9 @@ class OwnHalf:
         """How far it gets from a speed, before it reacts and while it brakes."""
         return speed_m_s * self.reacts_s + 0.5 * speed_m_s**2 / self._braking_m_s2
 
-    def fastest_m_s(self, pose: Pose2, ahead: FloatArray, share: float = 1.0) -> float:
+    def fastest_m_s(
+        self, pose: Pose2, ahead: FloatArray, share: float = 1.0, to_walls_m: float = 0.0
+    ) -> float:
         """The speed from which it can stop in time on a path; inf where nothing stands to be heeded.
 
         Parameters
@@ -95,14 +104,19 @@ class OwnHalf:
             (K, 3) of the path from here on, as far as it matters.
         share
             Of the gap, for who has to get out of where it stands: corners swing out before they leave.
+        to_walls_m
+            What it keeps from walls, at most what the outline as it was handed in keeps; nearer, it comes no
+            nearer.
         """
-        if not len(self.seen_m) or len(ahead) < 2:
+        if len(ahead) < 2:
             return math.inf
         poses, along_m = _from_here(ahead)
-        clear = poses_in_own_half(
-            poses, self._footprint.points_m, self._footprint.radius_m, _seen_from(pose, self.seen_m),
-            share * self._config.gap_m,
-        )  # fmt: skip
+        car = self._car._replace(clearance=min(to_walls_m, self._car.clearance))
+        clear = hybrid.poses_that_fit(_placed(poses, pose), NEARER_M, car, self._ground)
+        if len(self.seen_m):
+            outline, gap_m = self._footprint, share * self._config.gap_m
+            seen_m = _seen_from(pose, self.seen_m)
+            clear = min(clear, poses_in_own_half(poses, outline.points_m, outline.radius_m, seen_m, gap_m))
         if clear == len(poses):
             return math.inf
         clear_m = float(along_m[max(clear - 1, 0)])
@@ -122,6 +136,13 @@ def _from_here(ahead: FloatArray) -> tuple[FloatArray, FloatArray]:
         return poses, along_m
     at_m = np.linspace(0.0, along_m[-1], math.ceil(along_m[-1] / LOOK_M) + 1)
     return np.column_stack([np.interp(at_m, along_m, column) for column in poses.T]), at_m
+
+
+def _placed(poses: FloatArray, pose: Pose2) -> FloatArray:
+    """Poses (K, 3) of the base frame in the map."""
+    c, s = math.cos(pose.theta_rad), math.sin(pose.theta_rad)
+    x, y = poses[:, 0], poses[:, 1]
+    return np.column_stack([pose.x_m + c * x - s * y, pose.y_m + s * x + c * y, pose.theta_rad + poses[:, 2]])
 
 
 def _seen_from(pose: Pose2, points_m: FloatArray) -> FloatArray:

@@ -302,7 +302,8 @@ class GlobalPlan:
         states = np.vstack([request.start.as_array(), path.states])
         if hybrid.path_fits(states, path.turning_radius_m == 0.0, car, ground_of(request.field, car)):
             return ""
-        return f"the robot's outline does not fit along the path, which keeps {clearance_m:.2f} m{INSTEAD}"
+        instead = " beside it: it takes more room than there is" if self.beside_outline else INSTEAD
+        return f"the robot's outline does not fit along the path, which keeps {clearance_m:.2f} m{instead}"
 
     def _shape(self) -> tuple[Footprint | None, float]:
         """Outline and tightest arc, where the robot is known."""

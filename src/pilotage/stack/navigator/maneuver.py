@@ -34,6 +34,7 @@ from pilotage.stack.navigator.reference import STANDS, Reference
 from pilotage.stack.navigator.timed_path import laid_out, with_turns
 from pilotage.stack.navigator.trail import Trail
 from pilotage.stack.navigator.yielding import Act, Yielding, YieldingConfig
+from pilotage.stack.planning.outline import car_of, ground_of
 from pilotage.stack.planning.planner import Path, PlanResult, PlanStatus
 
 MOST_REPLANS, MOST_RESTS = 8, 3
@@ -46,6 +47,8 @@ HEADING_PER_S = 3.0
 """A heading error dies out in so much of a second's inverse while it turns on the spot."""
 AROUND, BACKING = 0.6, 0.2
 """Shares of the gap that are kept where it drives around somebody, and where it backs out before him."""
+WALL_M, LEAST_M = 0.02, 0.005
+"""Kept from the walls of the map on a path for the outline, or half of what the path keeps; and at least."""
 SEEN_M = 0.05
 """What is seen and on no map counts as discs of this radius where a path around it is planned."""
 
@@ -104,7 +107,9 @@ class ManeuverNavigator(LocalizingNavigator):
         self._controller: Controller = parts.controller or KanayamaController(config.tracking, robot)
         self._mapper, self._mates = parts.mapper, task.mates
         self._own_map = OwnMap(chart, parts.mapper)
-        self._own_half = OwnHalf(config.own_half, robot, chart, unexplained_of(parts))
+        car = car_of(robot.footprint, WALL_M, 1.0)
+        walls = car, ground_of(chart.field, car)
+        self._own_half = OwnHalf(config.own_half, robot, chart, unexplained_of(parts), walls)
         self._yielding = Yielding(config.yielding, robot.dt_s, robot.streams.stream("yielding"))
         rng = robot.streams.stream("planner")
         self._plan = GlobalPlan(
@@ -112,6 +117,7 @@ class ManeuverNavigator(LocalizingNavigator):
         )
         self._reference = Reference(np.zeros((0, 5)), robot.dt_s)
         self._replans, self._rests, self._backs = 0, 0, False
+        self._to_walls_m = 0.0
         self._trail: Trail | None = None
         self._think_at_s = 0.0
         if self.belief.status is BeliefStatus.LOST:
@@ -165,6 +171,8 @@ class ManeuverNavigator(LocalizingNavigator):
     def _lay_out(self, path: Path) -> None:
         """The reference along a path, from its first row on."""
         self._lay_out_states(path.states, path.turning_radius_m)
+        kept_m = self._journal.plans[-1].clearance_m
+        self._to_walls_m = min(WALL_M, max(0.5 * kept_m, LEAST_M)) if self._plan.beside_outline else 0.0
 
     def _lay_out_states(self, states: FloatArray, turning_radius_m: float) -> None:
         braking = self._robot.motion.braking_m_s2
@@ -211,10 +219,11 @@ class ManeuverNavigator(LocalizingNavigator):
             self._ends(readings.t_s)
             return STOP
         self._heed(readings, belief)
-        speed_m_s = self._reference.speed_m_s
+        # By where the reference is now: a step leads some way on, farther than astray in a long one.
+        there, speed_m_s = self._reference.pose(), self._reference.speed_m_s
         x, y, theta, v, w, to_go_m = self._reference.step().tolist()
         self._channel.tell(x, y, theta, to_go_m)
-        if math.hypot(x - pose.x_m, y - pose.y_m) > self._config.astray_m:
+        if math.hypot(there[0] - pose.x_m, there[1] - pose.y_m) > self._config.astray_m:
             return self._astray(readings.t_s)
         rate = self._reference.rate
         act = self._yielding.step(rate, rate * abs(speed_m_s) * self._robot.dt_s, backs=self._backs)
@@ -240,7 +249,8 @@ class ManeuverNavigator(LocalizingNavigator):
         speed_m_s = abs(reference.speed_m_s)
         within_m = half.stops_within_m(max(speed_m_s, self._config.speed_m_s))
         share = BACKING if self._backs else AROUND if self._yielding.tries else 1.0
-        fastest_m_s = half.fastest_m_s(belief.pose, reference.ahead(within_m, half.reacts_s), share)
+        ahead = reference.ahead(within_m, half.reacts_s)
+        fastest_m_s = half.fastest_m_s(belief.pose, ahead, share, self._to_walls_m)
         if speed_m_s == 0.0:
             reference.rate = 1.0 if fastest_m_s > 0.0 else 0.0
             return

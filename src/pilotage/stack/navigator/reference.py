@@ -47,7 +47,7 @@ class Reference:
         rows = self._rows[max(first - 1, 0) :]
         speeds = rows[1:, 3] if first else rows[:, 3]
         if not len(speeds):
-            return self._pose()[None, :]
+            return self.pose()[None, :]
         direction = float(np.sign(speeds[0]))
         if direction == 0.0:
             count = min(int(np.argmax(np.append(speeds, 1.0) != 0.0)), math.ceil(within_s / self._dt_s))
@@ -55,7 +55,7 @@ class Reference:
             count = int(np.argmax(np.append(speeds * direction, -1.0) <= 0.0))
             along_m = self._dt_s * np.abs(speeds[:count]).cumsum()
             count = min(count, int(np.searchsorted(along_m, within_m)) + 1)
-        return np.vstack([self._pose(), self._rows[first : first + count, :3]])
+        return np.vstack([self.pose(), self._rows[first : first + count, :3]])
 
     def step(self) -> FloatArray:
         """Move on by a step of its clock: (6,) pose, speed, turn rate and the way to go from there."""
@@ -65,10 +65,10 @@ class Reference:
         if len(self._rows) - self._at < STANDS:
             self._at = float(len(self._rows))
         to_go_m = np.interp(self._at, np.arange(len(self._to_go_m)), self._to_go_m)
-        return np.array([*self._pose(), v, w, to_go_m])
+        return np.array([*self.pose(), v, w, to_go_m])
 
-    def _pose(self) -> FloatArray:
-        """(3,) where it is: a row's pose at the end of its step."""
+    def pose(self) -> FloatArray:
+        """(3,) where it is: a row's pose at the end of its step, before the first one the first row's."""
         after = self._at - 1.0
         first = max(math.floor(after), 0)
         pose = self._rows[min(first, len(self._rows) - 1), :3].copy()
