@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pilotage.core.errors import InputError
-from pilotage.core.types import Pose2, Twist
+from pilotage.core.types import STOP, Pose2, Twist
 from pilotage.models.footprint import Footprint
 from pilotage.models.motion.bicycle import BicycleConfig
 from pilotage.models.motion.differential_drive import DifferentialDriveConfig
@@ -106,20 +106,35 @@ def test_a_localizers_jump_moves_the_goal_not_the_pose() -> None:
     assert then.goal_xy_m == after.goal_xy_m
 
 
-def test_who_is_lost_stands_and_is_not_at_a_goal_in_the_middle_of_the_map() -> None:
-    """It drove on from there, and was at a goal that lies there."""
+def lost_for_two_steps(mates: int) -> tuple[Noting, Told, list[Twist]]:
+    """Driving, lost in two steps with a controller that calls itself there, and driving on."""
     noting, told = Noting(), told_of(start=START)
+    told = replace(told, task=replace(told.task, mates=mates))
     stack = navigator(noting, told, Lost())
-    assert stack.step(readings(0.1, 0.1, 0.0)) == Twist(0.1, 0.0)
+    commands = [stack.step(readings(0.1, 0.1, 0.0))]
     noting.status = "arrived"
     for step in (2, 3):
-        assert stack.step(readings(0.1 * step, 0.0, 0.0)) == Twist(0.0, 0.0)
+        commands.append(stack.step(readings(0.1 * step, 0.0, 0.0)))
         assert stack.status[0] is StackStatus.RUNNING
         assert math.isnan(told.said["distance_to_go_m"])
     noting.status = "driving"
-    assert stack.step(readings(0.4, 0.1, 0.0)) == Twist(0.2, 0.0)
+    commands.append(stack.step(readings(0.4, 0.1, 0.0)))
+    return noting, told, commands
+
+
+def test_who_is_lost_wanders_and_is_not_at_a_goal_in_the_middle_of_the_map() -> None:
+    """It drove on from there, and was at a goal that lies there."""
+    noting, told, (driving, *lost, found) = lost_for_two_steps(0)
+    assert (driving, found) == (Twist(0.1, 0.0), Twist(0.2, 0.0))
+    assert all(command.v_m_s > 0.0 for command in lost)  # the lane ahead is open
     assert len(noting.views) == 2
     assert [event.kind for event in told.journal.events] == ["lost", "found"]
+
+
+def test_who_is_lost_among_others_stands() -> None:
+    _, _, (_, *lost, found) = lost_for_two_steps(1)
+    assert lost == [STOP, STOP]
+    assert found == Twist(0.2, 0.0)
 
 
 def test_it_arrives_when_its_controller_says_so_and_stays() -> None:

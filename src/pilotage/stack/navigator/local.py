@@ -15,11 +15,13 @@ from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.control.give_way import GiveWay, GiveWayConfig
 from pilotage.stack.control.local.drive import LocalDrive
 from pilotage.stack.control.make_room import MakeRoom, MakeRoomConfig
+from pilotage.stack.control.wander import WanderConfig
 from pilotage.stack.interface import NAVIGATORS, Belief, BeliefStatus, StackStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.localization.dead_reckoning import DeadReckoningConfig, DeadReckoningLocalizer
 from pilotage.stack.localization.localizer import Localizer
+from pilotage.stack.navigator.goal.wandering import Wandering
 from pilotage.stack.navigator.navigator import (
     LocalizingNavigator,
     Parts,
@@ -55,6 +57,8 @@ class LocalConfig(Config):
     shut_in_s: Positive = 6.0
     shut_in_m: Positive = 0.3
     """Having come no farther than this among people in that time, it makes room."""
+    wander: WanderConfig = WanderConfig()
+    """What it does alone on its floor while it does not know where it is."""
 
 
 @NAVIGATORS.add("local", LocalConfig)
@@ -66,8 +70,8 @@ class LocalNavigator(LocalizingNavigator):
     localizer the belief is dead reckoned; with one the goal stays where the localizer has it. With a
     planner the controller is led along its plan on the robot's own map, to which a mapper adds what it
     sees; without, it heads for the goal itself, which fails where the way leads far around. Between two
-    scans the last command stands; while its localizer is lost, the robot. Fails where the robot cannot turn
-    on the spot: the controllers reckon with it.
+    scans the last command stands. While its localizer is lost it wanders by the laser, and among others
+    stands. Fails where the robot cannot turn on the spot: the controllers reckon with it.
     """
 
     def __init__(
@@ -101,6 +105,7 @@ class LocalNavigator(LocalizingNavigator):
             DeadReckoningConfig(), robot, chart, task.initial, journal
         )
         super().__init__(localizer, journal)
+        self._wandering = Wandering(config.wander, robot, localizer)
         self._bodies = MovingBodies(
             config.moving_bodies, robot, chart, mates=task.mates, unexplained=unexplained_of(parts)
         )
@@ -136,7 +141,8 @@ class LocalNavigator(LocalizingNavigator):
         if self._is_lost(readings.t_s, belief):
             # Where the goal is nobody knows: a belief that was given up lies in the middle of the map.
             self._channel.tell(math.nan)
-            return STOP
+            alone = not (self._task.mates or self._bodies.about)
+            return self._wandering.step(readings) if alone else STOP
         if self._status is not StackStatus.RUNNING:
             self._channel.tell(away_m)
             return STOP
@@ -168,7 +174,7 @@ class LocalNavigator(LocalizingNavigator):
         knew = self._plan is None or self._plan.is_made
         lost = knew and belief.status is BeliefStatus.LOST and self._status is StackStatus.RUNNING
         if lost != self._lost:
-            what = "does not know where it is: stands until it does" if lost else "knows where it is, goes on"
+            what = "does not know where it is" if lost else "knows where it is, goes on"
             self._journal.say(t_s, "lost" if lost else "found", f"the robot {what}")
         self._lost = lost
         return lost
