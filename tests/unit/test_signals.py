@@ -11,6 +11,7 @@ import time
 import weakref
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -52,7 +53,8 @@ def test_a_second_signal_changes_nothing(number: int, code: int, tmp_path: Path)
     child = start(tmp_path / "streams", endless, True, folder=tmp_path)
     assert child.line(0) == "ready\n"
     os.kill(child.pid, number)
-    os.kill(child.pid, number)
+    with suppress(ProcessLookupError):  # on a busy machine it may have ended by the first
+        os.kill(child.pid, number)
     done = child.ended()
     assert done.returncode == code
     assert done.stderr.count("\n") == 1

@@ -8,6 +8,7 @@ import random
 import signal
 import sqlite3
 import time
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -121,10 +122,11 @@ def test_killed_again_and_again_it_ends_as_if_nothing_had_been(undisturbed: Path
         while done() < before + 2 and not process.over:
             time.sleep(0.03)
         time.sleep(rng.uniform(0.0, 0.1))
-        if kill == 1:
-            os.kill(process.pid, signal.SIGKILL)  # the parent alone: its workers follow
-        else:
-            os.killpg(process.pid, signal.SIGKILL)
+        with suppress(ProcessLookupError):  # where this test is slow it has ended by itself
+            if kill == 1:
+                os.kill(process.pid, signal.SIGKILL)  # the parent alone: its workers follow
+            else:
+                os.killpg(process.pid, signal.SIGKILL)
         process.ended()
         assert done() > before
         before = done()

@@ -7,7 +7,7 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -58,10 +58,11 @@ def test_a_signal_ends_it_without_orphans(
         time.sleep(0.03)
     began = time.monotonic()
     for number in sent:
-        if group:
-            os.killpg(process.pid, number)
-        else:
-            os.kill(process.pid, number)
+        with suppress(ProcessLookupError):  # it may have ended by the first before the second
+            if group:
+                os.killpg(process.pid, number)
+            else:
+                os.kill(process.pid, number)
         time.sleep(0.03)
     done = process.ended()
     err = done.stderr
