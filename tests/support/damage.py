@@ -353,7 +353,10 @@ def no_file(path: Path, rng: random.Random) -> str:
 
 
 def put(path: Path, content: Content | Callable[[Path], None]) -> None:
-    """Put other content, or what is no file, in the place of a file."""
+    """Put other content, or what is no file, in the place of a file.
+
+    Not over it: a file system would wait until the last one is on the disk.
+    """
     path.unlink(missing_ok=True)
     if isinstance(content, bytes):
         path.write_bytes(content)

@@ -24,18 +24,13 @@ from pilotage.logs.odometry_csv import COLUMNS, read_odometry_csv
 from pilotage.logs.reckoning_mat import read_reckoning_mat
 from pilotage.logs.steady_csv import read_steady_csv
 from pilotage.logs.trajectories import read_kitti, read_tum
+from support import damage
 from support.laser_drives import laser_drive
 from support.mrclam_drives import Events, Robot, write_mrclam
 
 Capture = pytest.CaptureFixture[str]
 Reader = Callable[[Path], object]
 RNG = np.random.default_rng(7)
-
-
-def anew(path: Path, data: bytes | bytearray | str) -> None:
-    """Write a file, not over the last one, for which a file system waits until it is on the disk."""
-    path.unlink(missing_ok=True)
-    path.write_bytes(data.encode() if isinstance(data, str) else data)
 
 
 def rows(*columns: Callable[[int], float], separator: str = " ", count: int = 12) -> str:
@@ -82,7 +77,7 @@ def test_a_text_cut_at_any_byte(tmp_path: Path, name: str) -> None:
     assert judged(reader, path) is not None
     ends = {i for i, letter in enumerate(text) if letter == "\n"}
     for cut in range(len(text)):
-        anew(path, text[:cut])
+        damage.put(path, text[:cut].encode())
         if judged(reader, path) is not None and name != "carmen.log":
             whole = cut in ends or cut - 1 in ends
             assert whole or text[:cut].count("\n") < 5, f"half a number was read, cut at byte {cut}"
@@ -94,7 +89,7 @@ def test_a_compressed_text_cut_at_any_byte(tmp_path: Path, name: str) -> None:
     path = tmp_path / name
     packed = gzip.compress(text.encode(), mtime=0)
     for cut in range(0, len(packed), 3):
-        anew(path, packed[:cut])
+        damage.put(path, packed[:cut])
         # A recording of scans is of use without its end: see below.
         assert judged(reader, path) is None or name == "carmen.log"
     path.write_bytes(packed)
@@ -110,7 +105,7 @@ def test_a_gzipped_recording_cut_in_half_is_read_up_to_the_cut(tmp_path: Path) -
     ]
     packed, path = gzip.compress("".join(lines).encode(), mtime=0), tmp_path / "carmen.log.gz"
     for cut in (len(packed) // 2, len(packed) - 1):
-        anew(path, packed[:cut])
+        damage.put(path, packed[:cut])
         log = read_laser_log(path)
         assert len(log) > 0.9 * 400 * cut / len(packed)
         np.testing.assert_allclose(log.ranges_m, drawn[: len(log)], atol=1e-4)
@@ -194,7 +189,7 @@ def test_a_mrclam_file_cut_at_any_byte(tmp_path: Path, folder: Path, name: str) 
     head = data.index(b"\n") + 1
     # All of the first lines, and of the rest a byte in 19: every column of some line.
     for cut in [*range(head + 120), *range(head + 120, len(data), 19)]:
-        anew(path, data[:cut])
+        damage.put(path, data[:cut])
         read = judged(lambda _: read_mrclam(tmp_path / "cut", 1), path)
         if read is not None:
             assert cut > head
@@ -284,14 +279,14 @@ def test_a_matlab_file_cut_or_damaged_anywhere(tmp_path: Path, name: str, packed
     data = path.read_bytes()
     assert judged(reader, path) is not None
     for cut in range(0, len(data), 7):
-        anew(path, data[:cut])
+        damage.put(path, data[:cut])
         assert judged(reader, path) is None
     rng = np.random.default_rng(1)
     for _ in range(200):
         damaged = bytearray(data)
         for at in rng.integers(0, len(data), 3):
             damaged[at] = rng.integers(256)
-        anew(path, damaged)
+        damage.put(path, bytes(damaged))
         judged(reader, path)
 
 

@@ -65,7 +65,7 @@ def localized(
     return found
 
 
-@pytest.mark.parametrize("wrong", [0.0, 0.05])
+@pytest.mark.parametrize("wrong", [0.0, 0.02, 0.05])
 def test_wrong_barcodes_do_no_harm_and_stay_outside_the_gate(tmp_path: Path, wrong: float) -> None:
     """The gate keeps nearly all that is right out of it: half of the wrong ones at least, few others."""
     events = Events(

@@ -32,6 +32,17 @@ def test_compose_and_inverse_are_those_of_matrices(a: Pose2, b: Pose2) -> None:
     np.testing.assert_allclose(matrix(a.inverse()), np.linalg.inv(matrix(a)), atol=1e-9)
 
 
+@given(poses, st.lists(st.tuples(coordinate, coordinate), max_size=4))
+def test_points_are_placed_as_poses_are_and_seen_where_they_were(
+    a: Pose2, places: list[tuple[float, float]]
+) -> None:
+    points = np.array(places).reshape(-1, 2)
+    placed = a.placed(points)
+    joined = [a.compose(Pose2(x, y, 0.0)) for x, y in places]
+    np.testing.assert_allclose(placed, np.array([(b.x_m, b.y_m) for b in joined]).reshape(-1, 2), atol=1e-9)
+    np.testing.assert_allclose(a.seen(placed), points, atol=1e-9)
+
+
 @given(poses, poses, poses)
 def test_they_are_a_group(a: Pose2, b: Pose2, c: Pose2) -> None:
     origin = Pose2(0.0, 0.0, 0.0)

@@ -54,6 +54,16 @@ class Pose2:
             _wrapped(self.theta_rad + inner.theta_rad),
         )
 
+    def placed(self, points_m: FloatArray) -> FloatArray:
+        """Points (K, 2) of this pose's frame in its parent frame."""
+        c, s = math.cos(self.theta_rad), math.sin(self.theta_rad)
+        return np.asarray(points_m @ np.array([[c, s], [-s, c]]) + np.array([self.x_m, self.y_m]))
+
+    def seen(self, points_m: FloatArray) -> FloatArray:
+        """Points (K, 2) of the parent frame in this pose's own: undoes ``placed``."""
+        c, s = math.cos(self.theta_rad), math.sin(self.theta_rad)
+        return np.asarray((points_m - np.array([self.x_m, self.y_m])) @ np.array([[c, -s], [s, c]]))
+
     def inverse(self) -> Pose2:
         """The parent's pose in this one's frame: ``p.compose(p.inverse())`` is the origin."""
         c, s = math.cos(self.theta_rad), math.sin(self.theta_rad)

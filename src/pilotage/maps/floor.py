@@ -171,10 +171,8 @@ class Floor:
 
     def cell_of(self, point_xy_m: FloatArray) -> tuple[int, int]:
         """Row and column of the cell that a point lies in, clipped to the floor."""
-        rows, columns = self.reachable.shape
-        row = math.floor((float(point_xy_m[1]) - self.origin_xy_m[1]) / self.cell_m)
-        column = math.floor((float(point_xy_m[0]) - self.origin_xy_m[0]) / self.cell_m)
-        return min(max(row, 0), rows - 1), min(max(column, 0), columns - 1)
+        rows, columns = self.cells_of(np.reshape(point_xy_m, (1, 2)))
+        return int(rows[0]), int(columns[0])
 
     def cells_of(self, points_xy_m: FloatArray) -> tuple[IntArray, IntArray]:
         """Rows (P,) and columns (P,) of the cells that points (P, 2) lie in, clipped to the floor."""

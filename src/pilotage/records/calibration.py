@@ -24,6 +24,7 @@ from pilotage.records.run_folder import draft_folder
 KINDS = tuple(ANSWERS)
 CALIBRATION_FILE, DATA_FILE, PARAMETER_FILE = "calibration.json", "data.npz", "parameters.yaml"
 SETS_FILE = "sets.yaml"
+AGAIN = "calibrate again"
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,16 +88,12 @@ def read_calibration(folder: Path) -> CalibrationData:
     try:
         require_answer(answer)
     except ValueError as error:
-        raise _damaged(path, error) from None
+        raise broken(path, error, AGAIN) from None
     archive = read_arrays(folder / DATA_FILE, DATA_BYTES)
     if archive is None:
         raise InputError(f"{folder}: expected a calibration folder, found no {DATA_FILE} in it")
     try:
         arrays = require_arrays(archive, answer)
     except ValueError as error:
-        raise _damaged(folder / DATA_FILE, error) from None
+        raise broken(folder / DATA_FILE, error, AGAIN) from None
     return CalibrationData(folder, answer, arrays, text_of(folder / PARAMETER_FILE, "a parameter file"))
-
-
-def _damaged(path: Path, problem: object) -> InputError:
-    return InputError(str(broken(path, problem)).replace("run the mission again", "calibrate again"))

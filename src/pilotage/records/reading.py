@@ -19,9 +19,9 @@ def clean_text(text: str) -> str:
     return _CONTROL.sub("\ufffd", text)
 
 
-def broken(path: Path, problem: object) -> InputError:
-    """The error for a file that is not what a run writes."""
-    return InputError(f"{path}: cannot be read, {problem}; run the mission again")
+def broken(path: Path, problem: object, remedy: str = "run the mission again") -> InputError:
+    """The error for a file that is not what a run, or another command, writes."""
+    return InputError(f"{path}: cannot be read, {problem}; {remedy}")
 
 
 def is_there(path: Path) -> bool:

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 from pilotage.core.errors import InputError
 from pilotage.core.files import read_json
 from pilotage.core.limits import DATA_BYTES
-from pilotage.core.types import FloatArray
+from pilotage.core.types import FloatArray, Pose2
 from pilotage.logs.trajectories import read_tum
 from pilotage.maps.occupancy_grid import OccupancyGrid
 from pilotage.maps.ros_map import read_ros_map
@@ -23,6 +23,7 @@ from pilotage.records.reading import broken, cleaned, is_there, object_of
 from pilotage.records.slam_keyframes import KEYFRAMES_FILE, LATEST_S, Keyframes, read_keyframes, within
 
 CLOSURES_FILE = "closures.json"
+AGAIN = "map the recording again"
 FILES = ("metrics.json", CLOSURES_FILE, "map.yaml", "before.tum", "covariances.npz", KEYFRAMES_FILE)
 _FINITE = Field(ge=-FARTHEST_M, le=FARTHEST_M, allow_inf_nan=False)
 _COUNT = Field(ge=0, le=2**31)
@@ -99,24 +100,13 @@ class SlamFolder:
         out = []
         for k in range(first, last + 1):
             cloud = frames.points_xy_m[frames.starts[k] : frames.starts[k + 1]].astype(np.float64)
-            out.append(seen_from(self.keyframe_poses[reference], placed(cloud, self.keyframe_poses[k])))
+            placed = Pose2.from_array(self.keyframe_poses[k]).placed(cloud)
+            out.append(Pose2.from_array(self.keyframe_poses[reference]).seen(placed))
         return np.concatenate(out)
 
     def reference(self, submap: int) -> FloatArray:
         """(3,) pose of a submap's reference keyframe."""
         return np.asarray(self.keyframe_poses[self.keyframes.extents[submap, 2]])
-
-
-def placed(points: FloatArray, pose: FloatArray) -> FloatArray:
-    """Points (K, 2) of a frame at a pose (3,)."""
-    c, s = np.cos(pose[2]), np.sin(pose[2])
-    return np.asarray(points @ np.array([[c, s], [-s, c]]) + pose[:2])
-
-
-def seen_from(pose: FloatArray, points: FloatArray) -> FloatArray:
-    """Points (K, 2) as seen from a pose (3,)."""
-    c, s = np.cos(pose[2]), np.sin(pose[2])
-    return np.asarray((points - pose[:2]) @ np.array([[c, -s], [s, c]]))
 
 
 def is_slam_folder(folder: Path) -> bool:
@@ -159,12 +149,12 @@ def read_slam_folder(folder: Path) -> SlamFolder:
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])
-        raise _damaged(folder / name, f"{where}: {first['msg'].lower()}") from None
+        raise broken(folder / name, f"{where}: {first['msg'].lower()}", AGAIN) from None
     except ValueError as error:
-        raise _damaged(folder / name, error) from None
+        raise broken(folder / name, error, AGAIN) from None
     before = read_tum(folder / "before.tum")
     if len(before) != count:
-        raise _damaged(folder / "before.tum", f"expected {count} poses, found {len(before)}")
+        raise broken(folder / "before.tum", f"expected {count} poses, found {len(before)}", AGAIN)
     turned = np.arctan2(before.rotations[:, 1, 0], before.rotations[:, 0, 0])
     return SlamFolder(
         folder,
@@ -193,8 +183,3 @@ def _require_submaps(closures: list[ClosureRow], count: int) -> None:
             raise ValueError(f"closure {row.number}: expected submaps below {count}, found others")
         if not bool((np.abs(row.relative) <= FARTHEST_M).all()):
             raise ValueError(f"closure {row.number}: expected finite numbers, found others")
-
-
-def _damaged(path: Path, problem: object) -> InputError:
-    line = str(broken(path, problem))
-    return InputError(line.replace("run the mission again", "map the recording again"))

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from pilotage.core.scan_update import LineVerdict, ScanUpdate
-from pilotage.core.types import FloatArray
+from pilotage.core.types import Pose2
 from pilotage.records.arrays import Arrays, read_arrays, write_arrays
 from pilotage.records.plans import places
 from pilotage.records.reading import broken, clean_text
@@ -105,23 +105,18 @@ def _update(arrays: Arrays, k: int) -> RecordedUpdate:
     walls = places(arrays, f"walls_m_{k}", (4,))
     if len(walls) != lines:
         raise ValueError(f"walls_m_{k}: expected {lines} rows, found {len(walls)}")
+    sensor = Pose2.from_array(before)
     return RecordedUpdate(
         t_s=arrays.scalar(f"t_s_{k}"),
         why=clean_text(arrays.word(f"why_{k}")),
         sensor_pose=before,
         sensor_pose_after=after,
-        points_m=_placed(before, points),
+        points_m=sensor.placed(points),
         clusters=clusters,
         members=members,
-        ends_m=_placed(before, ends.reshape(-1, 2)).reshape(-1, 4),
+        ends_m=sensor.placed(ends.reshape(-1, 2)).reshape(-1, 4),
         walls_m=walls,
         distances=arrays.floats(f"distances_{k}", lines),
         gate=arrays.scalar(f"gate_{k}"),
         verdicts=tuple(VERDICTS[v] for v in verdicts),
     )
-
-
-def _placed(pose: FloatArray, points: FloatArray) -> FloatArray:
-    """Points (N, 2) of the sensor's frame in the map frame."""
-    c, s = np.cos(pose[2]), np.sin(pose[2])
-    return np.asarray(points @ np.array([[c, s], [-s, c]]) + pose[:2])

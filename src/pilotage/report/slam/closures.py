@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from pilotage.records.slam_folder import ClosureRow, SlamFolder, placed
+from pilotage.core.types import Pose2
+from pilotage.records.slam_folder import ClosureRow, SlamFolder
 from pilotage.report.markup import ROW, VALUE, Html, Section, section, table
 from pilotage.report.slam.viewer import MOST_CLOSURES, script, viewer
 from pilotage.report.style import BLUE, VERMILLION, WIDTH_PT, Illustration, Key, render
@@ -54,7 +55,7 @@ def closures_figure(data: SlamFolder) -> Illustration:
         for number, colour in ((closure.earlier_submap, BLUE), (closure.later_submap, VERMILLION)):
             points = data.submap(number)
             if colour is VERMILLION:
-                points = placed(points, np.array(closure.relative))
+                points = Pose2.from_array(np.array(closure.relative)).placed(points)
             points = points[:: max(1, len(points) // POINTS)]
             axes.plot(points[:, 0], points[:, 1], ",", color=colour, alpha=0.8, rasterized=True)
         axes.set_xlim(-7.0, 7.0)

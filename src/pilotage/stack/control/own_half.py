@@ -111,11 +111,12 @@ class OwnHalf:
         if len(ahead) < 2:
             return math.inf
         poses, along_m = _from_here(ahead)
+        placed = np.column_stack([pose.placed(poses[:, :2]), pose.theta_rad + poses[:, 2]])
         car = self._car._replace(clearance=min(to_walls_m, self._car.clearance))
-        clear = hybrid.poses_that_fit(_placed(poses, pose), NEARER_M, car, self._ground)
+        clear = hybrid.poses_that_fit(placed, NEARER_M, car, self._ground)
         if len(self.seen_m):
             outline, gap_m = self._footprint, share * self._config.gap_m
-            seen_m = _seen_from(pose, self.seen_m)
+            seen_m = pose.seen(self.seen_m)
             clear = min(clear, poses_in_own_half(poses, outline.points_m, outline.radius_m, seen_m, gap_m))
         if clear == len(poses):
             return math.inf
@@ -128,25 +129,9 @@ def _from_here(ahead: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Poses (K, 3) along a path seen from its first one, close together, and how far along it they are."""
     step_m = np.hypot(*np.diff(ahead[:, :2], axis=0).T)
     turned = np.concatenate([[0.0], np.cumsum(wrap_array_to_pi(np.diff(ahead[:, 2])))])
-    c, s = math.cos(ahead[0, 2]), math.sin(ahead[0, 2])
-    offset = ahead[:, :2] - ahead[0, :2]
-    poses = np.column_stack([offset @ np.array([c, s]), offset @ np.array([-s, c]), turned])
+    poses = np.column_stack([Pose2.from_array(ahead[0]).seen(ahead[:, :2]), turned])
     along_m = np.concatenate([[0.0], np.cumsum(step_m)])
     if not along_m[-1] > 0.0:
         return poses, along_m
     at_m = np.linspace(0.0, along_m[-1], math.ceil(along_m[-1] / LOOK_M) + 1)
     return np.column_stack([np.interp(at_m, along_m, column) for column in poses.T]), at_m
-
-
-def _placed(poses: FloatArray, pose: Pose2) -> FloatArray:
-    """Poses (K, 3) of the base frame in the map."""
-    c, s = math.cos(pose.theta_rad), math.sin(pose.theta_rad)
-    x, y = poses[:, 0], poses[:, 1]
-    return np.column_stack([pose.x_m + c * x - s * y, pose.y_m + s * x + c * y, pose.theta_rad + poses[:, 2]])
-
-
-def _seen_from(pose: Pose2, points_m: FloatArray) -> FloatArray:
-    """Points (P, 2) of the map in the base frame."""
-    c, s = math.cos(pose.theta_rad), math.sin(pose.theta_rad)
-    offset = points_m - np.array([pose.x_m, pose.y_m])
-    return np.column_stack([offset @ np.array([c, s]), offset @ np.array([-s, c])])

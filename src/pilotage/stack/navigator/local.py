@@ -21,7 +21,6 @@ from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.localization.dead_reckoning import DeadReckoningConfig, DeadReckoningLocalizer
 from pilotage.stack.localization.localizer import Localizer
-from pilotage.stack.navigator.goal.wandering import Wandering
 from pilotage.stack.navigator.navigator import (
     LocalizingNavigator,
     Parts,
@@ -33,6 +32,7 @@ from pilotage.stack.navigator.navigator import (
     unexplained_of,
 )
 from pilotage.stack.navigator.plan_ahead import PlanAhead, PlanAheadConfig
+from pilotage.stack.navigator.wandering import Wandering
 from pilotage.stack.perception.moving_bodies import MovingBodies, MovingBodiesConfig
 
 PASSING_M = 0.05

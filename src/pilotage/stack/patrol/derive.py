@@ -103,11 +103,11 @@ def _derive_graph(world: WorldMap, floor: Floor, config: DerivationConfig) -> De
     stand, points, sees = views(world, floor, config.reach_m, config.stand_every_m, config.see_every_m)
     covered = np.zeros(len(points), np.bool_)
     # Between places that see as much, the one farther from walls: others pass, and people do.
-    rows, columns = np.array([floor.cell_of(place) for place in stand]).T
+    rows, columns = floor.cells_of(stand)
     chosen = greedy_cover(sees, floor.clearance_m[rows, columns], covered)
     vertices = stand[chosen]
     # What lies on a wall's line is no floor, though the body's edge can be there.
-    rows, columns = np.array([floor.cell_of(point) for point in points]).T
+    rows, columns = floor.cells_of(points)
     covered |= floor.clearance_m[rows, columns] <= ON_WALL * floor.cell_m
     if not covered.all():
         # Corners behind jambs: somebody has to look into them from nearby.
@@ -186,7 +186,7 @@ def _beside(floor: Floor, points_xy_m: FloatArray) -> BoolArray:
     """Cells that the body's centre can reach, near some of the points."""
     out = np.zeros_like(floor.reachable)
     reach = math.ceil(CLOSE_M / floor.cell_m)
-    for row, column in (floor.cell_of(point) for point in points_xy_m):
+    for row, column in zip(*floor.cells_of(points_xy_m), strict=True):
         square = (
             slice(max(0, row - reach), row + reach + 1),
             slice(max(0, column - reach), column + reach + 1),

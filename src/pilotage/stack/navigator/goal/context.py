@@ -20,7 +20,6 @@ from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.navigator.following import WaypointFollower
 from pilotage.stack.navigator.global_plan import GlobalPlan
-from pilotage.stack.navigator.goal.wandering import Wandering
 from pilotage.stack.navigator.goal_config import GoalNavigatorConfig, Mode
 from pilotage.stack.navigator.navigator import (
     TURN_RATE_RAD_S,
@@ -32,6 +31,7 @@ from pilotage.stack.navigator.navigator import (
 )
 from pilotage.stack.navigator.own_map import OwnMap
 from pilotage.stack.navigator.progress import PathProgress, StallWatch, patience_s
+from pilotage.stack.navigator.wandering import Wandering
 from pilotage.stack.perception.moving_bodies import MovingBodies
 from pilotage.stack.planning.local_planner import LocalPlanner
 from pilotage.stack.planning.planner import PlanResult

@@ -10,7 +10,6 @@ from pilotage.stack.interface import NAVIGATORS, Belief, BeliefStatus, StackStat
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.localization.localizer import Abilities
-from pilotage.stack.navigator.goal.wandering import Wandering
 from pilotage.stack.navigator.navigator import Parts, localizer_of
 from pilotage.stack.navigator.patrol.config import PatrolNavigatorConfig
 from pilotage.stack.navigator.patrol.context import Context
@@ -21,6 +20,7 @@ from pilotage.stack.navigator.patrol.states.charging import Charging
 from pilotage.stack.navigator.patrol.states.driving import Waiting
 from pilotage.stack.navigator.patrol.states.lost import Lost
 from pilotage.stack.navigator.patrol.states.state import State
+from pilotage.stack.navigator.wandering import Wandering
 
 COLUMNS = {
     "mode": "1",

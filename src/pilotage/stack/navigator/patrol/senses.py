@@ -178,10 +178,7 @@ class Senses:
 
     def on_map(self, points: FloatArray) -> FloatArray:
         """Points (M, 2) of the base frame on the map."""
-        if not len(points):
-            return points
-        c, s = math.cos(self.pose.theta_rad), math.sin(self.pose.theta_rad)
-        return np.asarray(points @ np.array([[c, s], [-s, c]]) + np.array([self.pose.x_m, self.pose.y_m]))
+        return self.pose.placed(points) if len(points) else points
 
     def strange_on_map(self) -> FloatArray:
         """(M, 2) what is on no map, map frame."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from pilotage.sensors.readings import Readings
-from pilotage.stack.navigator.goal.wandering import Wandering
 from pilotage.stack.navigator.patrol.config import Mode
 from pilotage.stack.navigator.patrol.context import Context
 from pilotage.stack.navigator.patrol.states.state import Move, Transitions
+from pilotage.stack.navigator.wandering import Wandering
 
 
 @dataclass(frozen=True, slots=True)
