@@ -10,12 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import Field, model_validator
 
-from pilotage.core.angles import wrap_array_to_pi, wrap_to_pi
+from pilotage.core.angles import is_in_view, wrap_array_to_pi, wrap_to_pi
 from pilotage.core.config import Config, validate
 from pilotage.core.errors import InputError, nearest, unknown_name
 from pilotage.core.random import RandomStreams
 from pilotage.core.registry import Registry
 from pilotage.core.types import Pose2
+from pilotage.sensors.lidar import LidarConfig
 
 angles_rad = st.floats(min_value=-1e4, max_value=1e4)
 
@@ -53,6 +54,24 @@ def test_wrapping_an_array_is_wrapping_each_element(angles: list[float]) -> None
 def test_the_borders_of_the_range(angle_rad: float, expected: float) -> None:
     assert wrap_to_pi(angle_rad) == expected
     assert wrap_array_to_pi(np.array([[angle_rad]])) == np.array([[expected]])
+
+
+@pytest.mark.parametrize("around_rad", [2.0 * math.pi, 6.283185307, 6.28])
+def test_a_scanner_that_looks_all_around_looks_behind(around_rad: float) -> None:
+    """However exactly the full turn was written down."""
+    fan = LidarConfig(beams=360, field_of_view_rad=around_rad).beam_angles_rad()
+    ends = float(fan[0]), float(fan[-1]), float(fan[1] - fan[0])
+    assert all(is_in_view(bearing, *ends) for bearing in np.linspace(-math.pi, math.pi, 1000))
+
+
+@given(st.floats(-math.pi, math.pi), st.floats(-math.pi, math.pi))
+def test_a_fan_sees_what_lies_between_its_ends(mount_rad: float, bearing_rad: float) -> None:
+    fan = LidarConfig(beams=271, field_of_view_rad=math.radians(270.0)).beam_angles_rad() + mount_rad
+    step = float(fan[1] - fan[0])
+    off_rad = abs(wrap_to_pi(bearing_rad - mount_rad))
+    if abs(off_rad - math.radians(135.0) - step) > 1e-9:
+        seen = is_in_view(bearing_rad, float(fan[0]), float(fan[-1]), step)
+        assert seen is (off_rad < math.radians(135.0) + step)
 
 
 # Value types

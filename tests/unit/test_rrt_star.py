@@ -9,13 +9,16 @@ import numpy as np
 import pytest
 
 from pilotage.core.errors import InputError
+from pilotage.core.types import Goal, Pose2
 from pilotage.kernels.rrt import dubins
 from pilotage.kernels.rrt import samples as rrt_samples
 from pilotage.kernels.rrt import star as rrt_star
 from pilotage.kernels.rrt import tree as rrt_tree
 from pilotage.kernels.rrt.clearance import least_step
 from pilotage.maps.distance_field import DistanceField
-from pilotage.stack.planning.driving_space import space_for
+from pilotage.maps.occupancy_grid import FREE, OCCUPIED, OccupancyGrid
+from pilotage.maps.world_map import WorldMap
+from pilotage.stack.planning.driving_space import blocked_end, space_for
 from pilotage.stack.planning.planner import PlanRequest, PlanResult, PlanStatus
 from pilotage.stack.planning.rrt_star_dubins import RrtStarDubinsConfig, RrtStarDubinsPlanner
 from support.planning_worlds import (
@@ -229,6 +232,22 @@ def test_blocked_ends_say_by_how_much() -> None:
     for result in (start, goal, outside):
         assert result.path is None
         assert math.isnan(result.first_solution_s)
+
+
+def test_an_end_deep_in_a_block_of_cells_is_told_so() -> None:
+    """Its distance from the nearest edge is no room."""
+    cells = np.full((60, 60), FREE, np.int8)
+    cells[20:40, 20:40] = OCCUPIED
+    field = WorldMap("block", (0, 0, 6, 6), grid=OccupancyGrid(cells, 0.1)).field
+    space = space_for(field, 0.46)
+    for x_m, told in (
+        (3.0, "inside an obstacle, 0.46 m are asked for"),
+        (1.7, "is 0.300 m from the nearest"),
+    ):
+        asked = PlanRequest(Pose2(x_m, 3.0, 0.0), Goal(1.0, 1.0), field, np.random.default_rng(0))
+        found = blocked_end(asked, space, 0.46)
+        assert found is not None
+        assert told in found[1]
 
 
 def test_start_on_the_edge_of_the_clearance_is_no_hindrance() -> None:

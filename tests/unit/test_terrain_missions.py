@@ -218,7 +218,7 @@ class TestReport:
     [
         (
             ["world.start.x_m=305"],
-            "world.start: expected at least the body's radius of 1.5 m to the nearest wall",
+            "world.start: expected at least the body's radius of 1.5 m to the nearest hazard",
         ),
         (
             ["world.goal.x_m=600.1"],
@@ -229,7 +229,15 @@ class TestReport:
         (["world.map.obstacles=nowhere.png"], "expected an image, found none there"),
         (["world.map.name=image"], "unknown world.map.name 'image'; did you mean 'images'?"),
         (["world.map.obstacle=a.png"], "world.map.obstacle: unknown key"),
-        (["stack.planner.name=rrt-star-dubins"], "a stack.planner over cells (astar, dijkstra, theta-star)"),
+        (
+            ["stack.planner.name=rrt-star-dubins"],
+            "(astar, dijkstra, theta-star), found a planner that does not search cells",
+        ),
+        (["stack.planner=null"], "(astar, dijkstra, theta-star), found no stack.planner"),
+        (
+            ["stack.planner=null", "stack.navigator=maneuver"],
+            "expected world.goal and stack.planner, found no stack.planner",
+        ),
         (["stack.planner.corner_cuting=true"], "did you mean 'corner_cutting'"),
         (["run.oracles=[localization]"], "run.oracles: expected one of planner"),
     ],

@@ -251,7 +251,7 @@ def test_hazards_of_one_point_and_of_many_agree(x: float, y: float, theta: float
 def test_what_no_layer_can_answer_is_refused_in_one_line() -> None:
     empty = WorldMap("void", (0, 0, 10, 8))
     for config, words in (
-        (LidarConfig(), "robot.sensors.it: lidar needs a world with walls or a grid, found an empty map"),
+        (LidarConfig(), "it: lidar needs a world with walls or a grid, or others about, found an empty map"),
         (InfraredConfig(rate_hz=10), "infrared needs a world with walls or a grid"),
         (LineSensorConfig(rate_hz=10), "line-sensor needs a world with floor markings, found an empty map"),
     ):

@@ -14,13 +14,16 @@ from PIL import Image
 
 from pilotage.cli.main import main
 from pilotage.core.errors import InputError
-from pilotage.core.types import Twist
+from pilotage.core.types import Pose2, Twist
 from pilotage.experiments.build.build import build
 from pilotage.experiments.build.charts import load_chart
 from pilotage.experiments.loop import run_loop
 from pilotage.experiments.mission import mission_of
 from pilotage.experiments.resolve import resolved_yaml
+from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan
+from pilotage.stack.interface import Belief
+from pilotage.stack.perception.unexplained import UnexplainedReturns
 from support.missions import drive
 
 WIDTH_M, HEIGHT_M, CELL_M = 6.0, 4.0, 0.1
@@ -201,6 +204,31 @@ class TestHeights:
             True,
             False,
         ]
+
+    def test_rovers_see_each_other_where_nothing_else_stands(self, tmp_path: Path) -> None:
+        """Across the cliff, which ends no beam; on nobody's map anything stands that explains a return."""
+        values = mission(heights(tmp_path))
+        values["robots"] = [{"name": "a"}, {"name": "b", "start": {"x_m": 5.0, "y_m": 1.0}}]
+        experiment = build(mission_of(values))
+        chart = experiment.chart
+        scan = experiment.simulator.step([Twist(0.0, 0.0)] * 2)[0].by_sensor["lidar"]
+        assert isinstance(scan, LidarScan)
+        assert scan.ranges_m[30] == pytest.approx(4.0 - 0.3, abs=1e-6)
+        assert len(chart.walls.segments_m) > 0 == len(chart.reflectors.segments_m)
+        assert chart.wall_field.at(np.array([[3.05, 1.0]]))[0] > 5.0
+        belief = Belief(Pose2(1.0, 1.0, 0.0), 0.04 * np.eye(3))
+        told = UnexplainedReturns(LidarConfig(beams=61), chart, 0.15, 3.0)
+        told.look_to(20.0)
+        assert 30 in told.of(scan, belief).beams
+
+    @pytest.mark.parametrize("name", ["particle-filter", "ekf-walls", "ekf-walls-report"])
+    def test_hazards_are_no_walls_to_localize_by(self, name: str, tmp_path: Path) -> None:
+        box = {"kind": "box", "from_m": [1.0, 3.0], "to_m": [2.0, 3.0]}
+        values = mission(heights(tmp_path), obstacles=[box])
+        values["stack"]["localizer"] = {"name": name}
+        values["robot"]["sensors"]["lidar"]["range_var_m2"] = 1e-4
+        with pytest.raises(InputError, match=f"^{name}: expected walls .*on the robot's map, found none"):
+            build(mission_of(values))
 
     def test_raw_heights_with_their_side_file(self, tmp_path: Path) -> None:
         np.zeros((8, 6), "<f4").tofile(tmp_path / "ground.raw")

@@ -22,3 +22,11 @@ def wrap_array_to_pi(angles_rad: FloatArray) -> FloatArray:
     """Wrap directions of any shape to [-pi, pi)."""
     wrapped = np.mod(angles_rad + math.pi, TWO_PI) - math.pi
     return np.where(wrapped >= math.pi, -math.pi, wrapped)
+
+
+def is_in_view(bearing_rad: float, first_rad: float, last_rad: float, step_rad: float) -> bool:
+    """Whether a direction lies in a fan of beams, or beside it no farther than they lie from one another.
+
+    Between the last beam of a scanner that looks all around and its first one nobody can hide.
+    """
+    return (bearing_rad - first_rad + step_rad) % TWO_PI <= last_rad - first_rad + 2.0 * step_rad

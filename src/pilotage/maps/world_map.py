@@ -20,6 +20,7 @@ from pilotage.maps.outlines import outlines
 from pilotage.maps.segment_map import SegmentMap
 
 FARTHEST_M = 1e9
+NO_SEGMENTS, NO_CIRCLES = np.zeros((0, 4)), np.zeros((0, 3))
 NO_LANDMARKS = Landmarks(np.zeros(0, dtype=np.int64), np.zeros((0, 2)))
 
 
@@ -78,15 +79,15 @@ class WorldMap:
         """Everything solid as segments and discs: of a grid the outlines of its occupied cells, exactly."""
         if self.geometry is not None:
             return self.geometry
-        segments: FloatArray = np.zeros((0, 4)) if self.grid is None else outlines(self.grid)
-        return SegmentMap(segments, np.zeros((0, 3)), self.bounds_m)
+        segments: FloatArray = NO_SEGMENTS if self.grid is None else outlines(self.grid)
+        return SegmentMap(segments, NO_CIRCLES, self.bounds_m)
 
     @cached_property
     def barriers(self) -> SegmentMap:
         """What is not driven into: the walls, and of a grid the outlines of its unknown cells as well."""
         if self.geometry is not None or self.grid is None or not (self.grid.cells < 0).any():
             return self.walls
-        return SegmentMap(outlines(self.grid, unknown_is_solid=True), np.zeros((0, 3)), self.bounds_m)
+        return SegmentMap(outlines(self.grid, unknown_is_solid=True), NO_CIRCLES, self.bounds_m)
 
     @cached_property
     def field(self) -> DistanceField:
@@ -95,9 +96,17 @@ class WorldMap:
             return ground_distance(self.barriers, self.grid)
         return DistanceField.from_map(self.barriers)
 
+    @property
+    def reflectors(self) -> SegmentMap:
+        """What ends a beam: the walls; nothing on open ground, whose hazards do not."""
+        return SegmentMap(NO_SEGMENTS, NO_CIRCLES, self.bounds_m) if self.open_ground else self.walls
+
     @cached_property
     def wall_field(self) -> DistanceField:
         """Distance to the nearest wall that returns a beam, sampled."""
+        if self.open_ground:  # one value says it all, however far the ground goes on
+            xmin, ymin, xmax, ymax = self.bounds_m
+            return DistanceField.from_map(self.reflectors, max(xmax - xmin, ymax - ymin))
         exact = self.geometry is not None or self.grid is None
         return self.field if exact else DistanceField.from_map(self.walls)
 

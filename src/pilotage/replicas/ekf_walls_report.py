@@ -23,7 +23,7 @@ from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 from pilotage.stack.interface import Belief
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge
-from pilotage.stack.localization.localizer import LOCALIZERS, require_initial_pose
+from pilotage.stack.localization.localizer import LOCALIZERS, require_initial_pose, require_walls
 
 CUTOFF_M = math.sqrt(0.2)
 """Its clusters' cutoff is one of squared distances."""
@@ -83,12 +83,13 @@ class EkfWallsReportLocalizer:
         self._compass = ""
         if config.heading == "compass":
             self._compass, _ = robot.one_sensor(CompassConfig, "ekf-walls-report")
+        require_walls(chart, "ekf-walls-report")
         self._step = lidar.beam_step_rad
         self._directions = clustering.beam_directions(
             float(lidar.beam_angles_rad()[0]), lidar.beam_step_rad, lidar.beams
         )
         self._max_range = min(MAX_RANGE_M, float(np.nextafter(lidar.max_range_m, 0.0)))
-        self._lines = _general_equations(chart.walls.segments_m)
+        self._lines = _general_equations(chart.reflectors.segments_m)
         self._Q = np.diag([config.odometry_distance_var_m2, config.odometry_angle_var_rad2])
         self._R = config.distance_var_m2
         self._threshold = config.threshold_chi2

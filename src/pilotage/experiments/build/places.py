@@ -177,8 +177,9 @@ def check_place(where: str, x_m: float, y_m: float, footprint: Footprint, chart:
     clear = room_m(chart, x_m, y_m, needed)
     if clear < needed:
         what = "the body's radius" if footprint.is_disc else "the body's inner radius"
+        nearest = "hazard" if chart.open_ground else "wall"
         raise InputError(
-            f"{where}: expected at least {what} of {needed:g} m to the nearest wall, "
+            f"{where}: expected at least {what} of {needed:g} m to the nearest {nearest}, "
             f"found {clear:.3f} m at ({x_m:g}, {y_m:g}); move it or make the body smaller"
         )
 

@@ -52,6 +52,11 @@ class Traffic:
         """Nobody about."""
         return Traffic(())
 
+    @property
+    def is_anybody(self) -> bool:
+        """Whether anybody can be met; who is alone in the world is in no traffic."""
+        return len(self.segments_m) + len(self.circles_m) > 0
+
     def put_people(self, places_m: FloatArray) -> None:
         """Put the people where they are now (P, 2); NaN: not there."""
         rows = self.circles_m[self.first_person :]

@@ -102,11 +102,12 @@ class World:
 
     @property
     def has_solids(self) -> bool:
-        """Whether it has a layer that beams end at."""
+        """Whether it has a layer that beams end at: on bare terrain that may be who else is about."""
         return (
             self.chart.geometry is not None
             or (self.chart.grid is not None and not self._open_ground)
             or len(self.segments_m) + len(self.circles_m) > 0
+            or self.traffic.is_anybody
         )
 
     @property
@@ -120,12 +121,12 @@ class World:
         Raises
         ------
         InputError
-            Where there are neither walls nor a grid of solid cells.
+            Where there are neither walls nor a grid of solid cells, and nobody else is about.
         """
         if not self.has_solids:
             raise InputError(
-                f"{where}: {what} needs a world with walls or a grid, found {self._layers()}; "
-                f"take the sensor off or choose another map"
+                f"{where}: {what} needs a world with walls or a grid, or others about, "
+                f"found {self._layers()}; take the sensor off or choose another map"
             )
 
     def check_markings(self, where: str, what: str) -> FloorLayer:

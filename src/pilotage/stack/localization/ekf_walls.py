@@ -22,7 +22,7 @@ from pilotage.stack.interface import Belief, BeliefStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.localization.gyro_odometry import GyroOdometry
-from pilotage.stack.localization.localizer import LOCALIZERS, require_initial_pose
+from pilotage.stack.localization.localizer import LOCALIZERS, require_initial_pose, require_walls
 from pilotage.stack.localization.odometry_prediction import OdometryBelief, OdometryPrediction
 from pilotage.stack.localization.odometry_watch import LINEAR_RAD, STANDS_M, TURN_AS_PATH_M, OdometryWatch
 from pilotage.stack.localization.recovery import Recovery, RecoveryConfig
@@ -102,6 +102,7 @@ class EkfWallsLocalizer:
                 "ekf-walls: a scanner without noise leaves the filter no measurement variance; "
                 "set stack.localizer.range_var_m2 above 0"
             )
+        require_walls(chart, "ekf-walls")
         self._prediction = OdometryPrediction(
             odometry, config.odometry, config.odometry_var_scale, config.odometry_model
         )
@@ -111,7 +112,7 @@ class EkfWallsLocalizer:
         self._var_scale = config.measurement_var_scale
         self._joint, self._moved_m, self._alike = isinstance(lidar, JointLidarConfig), 0.0, 0
         self._mount = np.array([lidar.mount.x_m, lidar.mount.y_m, lidar.mount.theta_rad])
-        self._matcher = WallMatcher(config.matching, config.gate, chart.walls, self._mount)
+        self._matcher = WallMatcher(config.matching, config.gate, chart.reflectors, self._mount)
         if config.recovery is None:
             require_initial_pose(initial, "ekf-walls without recovery")
             self._recovery = None

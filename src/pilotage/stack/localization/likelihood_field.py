@@ -62,10 +62,10 @@ class LikelihoodField:
         reach_m: float,
         joint: bool = False,
     ) -> None:
-        on_cells = chart.geometry is None and chart.grid is not None
+        on_cells = chart.geometry is None and chart.grid is not None and not chart.open_ground
         self._on_cells, self._joint = on_cells, joint
         self.independent_share = INDEPENDENT_SHARE if on_cells else 1.0
-        half_m, least_std_m, walls = 0.0, WALL_STD_M, chart.walls
+        half_m, least_std_m, walls = 0.0, WALL_STD_M, chart.reflectors
         if on_cells and chart.grid is not None:
             half_m, least_std_m = 0.5 * chart.grid.resolution_m, GRID_SHARE * chart.grid.resolution_m
             walls = SegmentMap(rim_lines(chart.grid), np.zeros((0, 3)), chart.bounds_m)

@@ -12,6 +12,7 @@ from pilotage.core.checked import Gives, misfit, told
 from pilotage.core.errors import InputError
 from pilotage.core.registry import Registry
 from pilotage.core.types import FloatArray
+from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.readings import Readings
 from pilotage.stack.interface import Belief, BeliefStatus
 from pilotage.stack.mapping.scan_grid import ScanGrid
@@ -99,6 +100,21 @@ class WrappedLocalizer:
     def step(self, readings: Readings) -> Belief:
         """Take in one step's readings."""
         return self._localizer.step(readings)
+
+
+def require_walls(chart: WorldMap, name: str) -> None:
+    """Refuse a map without a straight wall.
+
+    Raises
+    ------
+    InputError
+        If no beam can end at a line that is on the map: the filter would dead-reckon for ever.
+    """
+    if not len(chart.reflectors.segments_m):
+        raise InputError(
+            f"{name}: expected walls on the robot's map, found none that a beam ends at on '{chart.name}'; "
+            "see stack.map"
+        )
 
 
 def require_initial_pose(initial: Belief, name: str) -> None:

@@ -69,7 +69,7 @@ class Recovery:
     ) -> None:
         self._config = config
         self._fit = ScanFit(
-            chart.walls,
+            chart.reflectors,
             lidar,
             max_range_m,
             config.near_m,
@@ -78,14 +78,14 @@ class Recovery:
         )
         self._search = GlobalSearch(
             config.search,
-            chart.walls,
+            chart.reflectors,
             self._fit,
             matcher,
             mount,
             prediction,
             robot.radius_m,
         )
-        self._viewpoint = Viewpoint(config.viewpoint, chart.walls, lidar, robot.radius_m)
+        self._viewpoint = Viewpoint(config.viewpoint, chart.reflectors, lidar, robot.radius_m)
         self._contradicted = self._unexplained = self._unplaced = 0
         self._met = MatesMet()
 

@@ -23,6 +23,7 @@ from pilotage.stack.navigator.navigator import (
     Parts,
     arrival_within_m,
     check_keeps_time,
+    missing,
     only_goal,
     turn_at_goal_rad,
     turned_by,
@@ -83,10 +84,12 @@ class CurveNavigator:
     ) -> None:
         goal = only_goal(task, "curve")
         check_keeps_time(parts, "curve")
-        if goal is None or not hasattr(parts.planner, "search"):
+        planner = parts.planner
+        if goal is None or not hasattr(planner, "search"):
+            absent = missing({"world.goal": goal, "stack.planner": planner})
             raise InputError(
                 f"{NAME}: expected world.goal and a stack.planner over cells (astar, dijkstra, theta-star), "
-                "found one missing"
+                f"found {absent or 'a planner that does not search cells'}"
             )
         self._localizer, self._controller, self._journal = parts.localizer, parts.controller, journal
         self._initial, self._task = task.initial, task
@@ -98,9 +101,8 @@ class CurveNavigator:
         self._arrival_m = arrival_within_m(None, task.goal_tolerance_m)
         self._status, self._reason = StackStatus.RUNNING, ""
         self._references: FloatArray = np.zeros((0, 5))
-        planner = cast(GridPlanner, parts.planner)
-        start = self.belief.pose
-        route = route_over_cells(chart, planner, config.cost_map, robot.radius_m, start, goal, NAME)
+        start, cells = self.belief.pose, cast(GridPlanner, planner)
+        route = route_over_cells(chart, cells, config.cost_map, robot.radius_m, start, goal, NAME)
         journal.planning_time_s += route.result.planning_time_s
         journal.result("route", lambda: route)
         path = route.result.path
@@ -109,8 +111,9 @@ class CurveNavigator:
         if path is None or config.spline is None:
             self._planned_only(route)
             return
+        absent = missing({"stack.localizer": parts.localizer, "stack.controller": parts.controller})
         if parts.localizer is None or parts.controller is None:
-            raise InputError(f"{NAME}: expected stack.localizer and stack.controller, found one missing")
+            raise InputError(f"{NAME}: expected stack.localizer and stack.controller, found {absent}")
         grid = grid_of(chart, NAME)
         curve, self._reason = curve_along(route, grid, config.spline.clear)
         why = self._reason if curve is None else self._cannot_drive(curve, grid.resolution_m)

@@ -26,6 +26,7 @@ from pilotage.stack.navigator.navigator import (
     Parts,
     check_keeps_time,
     localizer_of,
+    missing,
     only_goal,
     unexplained_of,
 )
@@ -97,7 +98,8 @@ class ManeuverNavigator(LocalizingNavigator):
     ) -> None:
         goal = only_goal(task, "maneuver")
         if goal is None or parts.planner is None:
-            raise InputError("navigator 'maneuver': expected world.goal and stack.planner, found one missing")
+            absent = missing({"world.goal": goal, "stack.planner": parts.planner})
+            raise InputError(f"navigator 'maneuver': expected world.goal and stack.planner, found {absent}")
         super().__init__(localizer_of(parts, "maneuver"), journal)
         self._channel = journal.channel(
             {"ref_x_m": "m", "ref_y_m": "m", "ref_theta_rad": "rad", "distance_to_go_m": "m"}, first=True

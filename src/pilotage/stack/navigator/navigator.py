@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from pilotage.core.angles import wrap_to_pi
@@ -44,6 +45,11 @@ class Parts:
     local_controller: LocalController | None = None
     heading: HeadingFilter | None = None
     patrol: PatrolTask | None = None
+
+
+def missing(needed: Mapping[str, object]) -> str:
+    """Which of what is needed, by its key in a mission, is None, as "no world.goal"; else nothing."""
+    return " and ".join(f"no {key}" for key, part in needed.items() if part is None)
 
 
 def arrival_within_m(arrival_m: float | None, goal_tolerance_m: float) -> float:

@@ -29,8 +29,8 @@ class OwnMap:
 
     def __init__(self, told: WorldMap, mapper: Mapper | None) -> None:
         self.told = told
-        self.walls = NearWalls(told.walls.segments_m)
-        same = told.barriers is told.walls
+        self.walls = NearWalls(told.reflectors.segments_m)
+        same = told.barriers is told.reflectors
         self.barriers = self.walls if same else NearWalls(told.barriers.segments_m)
         self.known_circles_m = told.walls.circles_m
         self._mapper = mapper

@@ -11,7 +11,7 @@ from pilotage.stack.interface import NAVIGATORS, StackStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.navigator.global_plan import GlobalPlan
-from pilotage.stack.navigator.navigator import LocalizingNavigator, Parts, localizer_of, only_goal
+from pilotage.stack.navigator.navigator import LocalizingNavigator, Parts, localizer_of, missing, only_goal
 
 
 class PlanOnlyConfig(Config):
@@ -37,9 +37,8 @@ class PlanOnlyNavigator(LocalizingNavigator):
         del config
         goal = only_goal(task, "plan-only")
         if goal is None or parts.planner is None:
-            raise InputError(
-                "navigator 'plan-only': expected world.goal and stack.planner, found one missing"
-            )
+            absent = missing({"world.goal": goal, "stack.planner": parts.planner})
+            raise InputError(f"navigator 'plan-only': expected world.goal and stack.planner, found {absent}")
         super().__init__(localizer_of(parts, "plan-only"), journal)
         rng = robot.streams.stream("planner")
         least_m = robot.footprint.inner_radius_m

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from pydantic import Field
 
+from pilotage.core.angles import is_in_view
 from pilotage.core.config import Config
 from pilotage.core.types import BoolArray, FloatArray, IntArray, Pose2
 from pilotage.kernels.control import movers as kernels
@@ -63,7 +64,8 @@ class MovingBodies:
     One that stands is left to the mapper; one that walks is nothing to be mapped but somebody to give way to,
     and so is, where people are about, one that is too new to tell.
     Where a robot has mates one of them may be wherever its laser does not look, seen before or not.
-    Idle where told to mind nobody, without exactly one lidar or known walls, or while the robot is lost.
+    Idle where told to mind nobody, without exactly one lidar, without known walls (on open ground, whose
+    hazards return no beam, none are needed), or while the robot is lost.
     Groups wider than ``tracks.widest_m`` without a notch between two are left to the mapper.
     """
 
@@ -80,8 +82,9 @@ class MovingBodies:
         self._config = config
         self._movers = Movers(config.tracks)
         lidars = list(robot.sensors_of(LidarConfig).items())
-        walls = chart.walls
-        self._works = minds and len(lidars) == 1 and len(walls.segments_m) + len(walls.circles_m) > 0
+        walls = chart.reflectors
+        known = chart.open_ground or len(walls.segments_m) + len(walls.circles_m) > 0
+        self._works = minds and len(lidars) == 1 and known
         self._mates = mates
         self._walks: BoolArray = np.zeros(0, np.bool_)
         self._t_s = self.seen_s = -math.inf
@@ -218,8 +221,7 @@ class MovingBodies:
         """Whether somebody may be in a direction of the base's frame in which the laser does not look."""
         if not self._works:
             return False
-        first, last = self._field
-        sees = (bearing_rad - first) % (2.0 * math.pi) <= last - first
+        sees = is_in_view(bearing_rad, *self._field, self._step)
         return not sees and (self._mates > 0 or self._t_s - self.seen_s < self._config.backs_after_s)
 
     def discs_m(self) -> FloatArray:

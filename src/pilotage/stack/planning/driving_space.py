@@ -66,7 +66,7 @@ def blocked_end(request: PlanRequest, space: Space, clearance_m: float) -> tuple
             where = f"the map, x {xmin:g} to {xmax:g} m and y {ymin:g} to {ymax:g} m"
             return status, f"the {name} ({x:g}, {y:g}) lies outside {where}"
         distance_m = slack_at(x, y, space, 0.0)
-        if space.margin > 0.0:
+        if space.margin > 0.0 and distance_m >= 0.0:
             distance_m = float(slack_at(x, y, space._replace(margin=math.inf), 0.0))
         gap = "inside an obstacle" if distance_m < 0.0 else f"{distance_m:.3f} m from the nearest obstacle"
         return status, f"the {name} ({x:g}, {y:g}) is {gap}, {clearance_m:g} m are asked for"

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from pilotage.core.angles import TWO_PI, is_in_view
 from pilotage.kernels.control.footprint import polygon_distance
 from pilotage.stack.control.local.role import LocalView
 from pilotage.stack.control.local.rolling import Scene
@@ -13,9 +14,10 @@ from pilotage.stack.control.local.rolling import Scene
 
 def blind_rad(view: LocalView) -> float:
     """Width of the sector that no beam looks into, if it holds what is straight behind; else 0."""
-    first, looks = float(view.beam_angles_rad[0]), float(view.beam_angles_rad[-1] - view.beam_angles_rad[0])
-    behind = (math.pi - view.mount.theta_rad - first) % (2.0 * math.pi)
-    return 0.0 if behind <= looks else 2.0 * math.pi - looks
+    first, last = float(view.beam_angles_rad[0]), float(view.beam_angles_rad[-1])
+    step = (last - first) / max(len(view.beam_angles_rad) - 1, 1)
+    behind = math.pi - view.mount.theta_rad
+    return 0.0 if is_in_view(behind, first, last, step) else TWO_PI - (last - first)
 
 
 def blind_clearance_m(view: LocalView, scene: Scene, enough_m: float) -> float:
