@@ -333,17 +333,32 @@ def test_a_pair_that_shares_a_short_round_keeps_no_plan_from_being_taken() -> No
     assert plan.mean_m < 0.97 * alone.mean_m
 
 
-def test_rounds_that_only_turn_back_are_not_taken_for_short() -> None:
-    """Around a court shares of two places promise the tour's worst and mean; each of them is half turns."""
+def court() -> PatrolGraph:
+    """Eight places around a square."""
     xy = np.array(
         [[0.0, 0.0], [3.0, 0.0], [6.0, 0.0], [6.0, 3.0], [6.0, 6.0], [3.0, 6.0], [0.0, 6.0], [0.0, 3.0]]
     )
     edges = np.full((8, 8), math.inf)
     for a in range(8):
         edges[a, (a + 1) % 8] = edges[(a + 1) % 8, a] = 3.0
-    setting = setting_for(PatrolGraph.of(xy, edges), (0, 2, 4, 6))
+    return PatrolGraph.of(xy, edges)
+
+
+def test_rounds_that_only_turn_back_are_not_taken_for_short() -> None:
+    """Around a court shares of two places promise the tour's worst and mean; each of them is half turns."""
+    setting = setting_for(court(), (0, 2, 4, 6))
     assert best_plan(setting, 4, AdaptiveRoundsConfig()).sizes == (1, 1, 1, 1)
     assert best_plan(replace(setting, turn_m=0.8), 4, AdaptiveRoundsConfig()).sizes == (4,)
+
+
+def test_sharing_a_round_counts_for_more_where_nobody_hears_anybody() -> None:
+    talking = replace(setting_for(court(), (0, 2, 4, 6)), turn_m=0.8)
+    config = AdaptiveRoundsConfig()
+    assert best_plan(talking, 4, config).sizes == (4,)
+    deaf = replace(talking, talks=False)
+    assert best_plan(deaf, 4, AdaptiveRoundsConfig(deaf_cost=0.0)).sizes == (4,)
+    assert best_plan(deaf, 4, AdaptiveRoundsConfig(deaf_cost=2.0)).sizes == (1, 1, 1, 1)
+    assert best_plan(talking, 4, AdaptiveRoundsConfig(deaf_cost=2.0)).sizes == (4,)
 
 
 def test_a_plan_with_turns_is_as_long_as_its_walks_are_judged() -> None:

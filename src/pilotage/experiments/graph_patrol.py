@@ -34,6 +34,11 @@ class Radio:
     delay_s: float = 0.0
     period_s: float = 5.0
 
+    @property
+    def works(self) -> bool:
+        """Whether any broadcast ever reaches anybody."""
+        return self.range_m > 0.0 and self.loss < 1.0
+
 
 IDEAL_RADIO = Radio()
 
@@ -116,7 +121,8 @@ class _Run:
         self._robots: list[_Robot] = []
         for index, start in enumerate(trial.starts.tolist()):
             own = streams.within(f"robot-{index}")
-            setting = PatrolSetting(graph, index, trial.starts, trial.speed_m_s, own.stream("strategy"))
+            rng = own.stream("strategy")
+            setting = PatrolSetting(graph, index, trial.starts, trial.speed_m_s, rng, talks=trial.radio.works)
             memory = PatrolMemory(len(graph), index, len(trial.starts), start, trial.speed_m_s)
             rng = own.stream("edges")
             pace = math.exp(trial.robot_std * rng.standard_normal())

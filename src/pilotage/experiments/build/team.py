@@ -20,6 +20,7 @@ from pilotage.missions.mission import Mission
 from pilotage.missions.places import GoalConfig
 from pilotage.missions.robot import RobotConfig
 from pilotage.missions.stack import StackConfig
+from pilotage.sensors.radio import RadioConfig
 from pilotage.stack.interface import NAVIGATORS, Stack
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
@@ -135,6 +136,8 @@ def _shares(
     roadmaps = _roadmaps(mission, chart, sheets, PatrolPlaces.of(site.graph, supply, site.visit_m))
     graph, passages = as_driven(site.graph, site.passages, roadmaps)
     assert mission.team.strategy is not None, "the task looked"
+    radios = [radio for sheet in sheets for radio in sheet.sensors_of(RadioConfig).values()]
+    talks = sum(radio.loss < 1.0 for radio in radios) > 1
     shares = []
     for index, sheet in enumerate(sheets):
         setting = PatrolSetting(
@@ -146,6 +149,7 @@ def _shares(
             passages=passages,
             starts_m=site.starts_m,
             turn_m=site.turn_m,
+            talks=talks,
         )
         strategy = build_component(STRATEGIES, mission.team.strategy, "strategy", setting)
         shares.append(PatrolTask(graph, site.visit_m, site.near_m, site.starts, index, strategy, supply))

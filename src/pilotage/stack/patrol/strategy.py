@@ -37,6 +37,8 @@ class PatrolSetting:
         (N, V) length of the path from each robot's starting place to each vertex; None: it is at its vertex.
     turn_m
         What turning back at a vertex costs, as a distance.
+    talks
+        Whether any two robots of the team could hear each other, by their data sheets.
     """
 
     graph: PatrolGraph
@@ -48,6 +50,7 @@ class PatrolSetting:
     passages: Passages = OPEN
     starts_m: FloatArray | None = None
     turn_m: float = 0.0
+    talks: bool = True
 
     @property
     def team_size(self) -> int:

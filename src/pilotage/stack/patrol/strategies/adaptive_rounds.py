@@ -33,20 +33,22 @@ class AdaptiveRoundsConfig(Config):
     """How plans are weighed, and when a robot waits or gives another one up.
 
     A plan's cost is its worst idleness plus ``mean_weight`` times its mean; of a round that several robots
-    share the worst counts ``sharing_cost`` more and the mean half of that, for what keeping apart costs; one
-    on which they are nearer to each other than ``headway_m`` is taken only where there is no other. In a
-    passage that has room for one, meeting who comes the other way takes ``meeting_m`` of driving beside its
-    length. Turning back takes ``late_m`` more than data sheets say, for decisions are made a few times a
-    second. Where that would lead to a worst idleness of more than ``worst_ratio`` times the bound, plans are
-    weighed with it, among those in which robots on one round are ``headway_m`` apart and do not meet in
-    passages. A robot waits while it is further ahead of its place among those that share its round than
-    ``slack`` of a mean leg between stops, within which nobody knows where the others are, or ``most_slack``
-    of the time between them. At a stop in a passage that has room for one, or no farther than
-    ``beside_passage_m`` from it, it never waits: those who are late would have to come by.
+    share the worst counts ``sharing_cost`` more and the mean half of that, for what keeping apart costs, or
+    ``deaf_cost`` where nobody hears anybody, for what not keeping apart does; one on which they are nearer
+    to each other than ``headway_m`` is taken only where there is no other. In a passage that has room for
+    one, meeting who comes the other way takes ``meeting_m`` of driving beside its length. Turning back
+    takes ``late_m`` more than data sheets say, for decisions are made a few times a second. Where that
+    would lead to a worst idleness of more than ``worst_ratio`` times the bound, plans are weighed with it,
+    among those in which robots on one round are ``headway_m`` apart and do not meet in passages. A robot
+    waits while it is further ahead of its place among those that share its round than ``slack`` of a mean
+    leg between stops, within which nobody knows where the others are, or ``most_slack`` of the time between
+    them. At a stop in a passage that has room for one, or no farther than ``beside_passage_m`` from it, it
+    never waits: those who are late would have to come by.
     """
 
     mean_weight: NonNegative = 2.0
     sharing_cost: NonNegative = 0.06
+    deaf_cost: NonNegative = 0.15
     meeting_m: NonNegative = 2.5
     late_m: NonNegative = 0.4
     worst_ratio: Positive = 1.25
@@ -68,17 +70,21 @@ def best_plan(setting: PatrolSetting, robots: int, config: AdaptiveRoundsConfig)
     How many rounds is chosen by lengths and waits, and its rounds are those that turn back least for that.
     Where they promise more than the worst that is asked for, turning back included, it is chosen by lengths,
     waits and turns, among plans whose robots go one way where there is room for one.
+
+    Where nobody hears anybody nothing keeps those who share a round apart, and small delays add up: sharing
+    costs more there.
     """
     graph = setting.graph
     most = min(robots, len(graph))
-    weights = config.mean_weight, config.sharing_cost
+    sharing_cost = config.sharing_cost if setting.talks else config.deaf_cost
+    weights = config.mean_weight, sharing_cost
     # What lies between is much alike: a few numbers of groups stand for all.
     numbers = {1, 2, 3, robots // 2, robots - 1, robots, most}
     sizes = [even_sizes(robots, groups) for groups in sorted(numbers) if 1 <= groups <= most]
 
     def promises(plan: Plan) -> tuple[float, float]:
         driven = slowed(plan, setting.passages, config.meeting_m)
-        worst_m, mean_m = driven.expected_m(len(graph), config.sharing_cost)
+        worst_m, mean_m = driven.expected_m(len(graph), sharing_cost)
         return worst_m, worst_m + config.mean_weight * mean_m
 
     def crowds(plan: Plan) -> bool:
