@@ -73,7 +73,7 @@ def _whole(
     if values.dtype.kind == "f":
         raise InputError(
             f"array '{path}': expected a grid of truth values or of whole per cent, found {values.dtype}; "
-            "save probabilities p as (100 * p).round().astype('int8'); heights: plan with --slope-limit, in a "
-            f"mission world.map: {{name: elevation, file: {path.name}}}"
+            "save probabilities p as (100 * p).round().astype('int8'); heights: plan with --slope-limit, "
+            f"in a mission world.map: {{name: elevation, file: {path.name}}}"
         )
     return values
