@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
+from pilotage.kernels.geometry.plane import NO_CIRCLES, NO_SEGMENTS
 from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.elevation import ElevationModel
 from pilotage.maps.ground_distance import ground_distance
@@ -20,7 +21,6 @@ from pilotage.maps.outlines import outlines
 from pilotage.maps.segment_map import SegmentMap
 
 FARTHEST_M = 1e9
-NO_SEGMENTS, NO_CIRCLES = np.zeros((0, 4)), np.zeros((0, 3))
 NO_LANDMARKS = Landmarks(np.zeros(0, dtype=np.int64), np.zeros((0, 2)))
 
 

@@ -10,6 +10,7 @@ from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray, IntArray, Pose2
 from pilotage.kernels.bodies import clearances, drive
 from pilotage.kernels.geometry.motion import turned_part
+from pilotage.kernels.geometry.plane import NO_CIRCLES, NO_SEGMENTS
 from pilotage.kernels.geometry.solids import Fixed
 from pilotage.kernels.scans import mounted, sight
 from pilotage.maps.landmarks import Landmarks
@@ -19,9 +20,6 @@ from pilotage.sim.worlds.floor import FloorLayer
 from pilotage.sim.worlds.grid import GridLayer
 from pilotage.sim.worlds.ground import GroundLayer
 from pilotage.sim.worlds.traffic import NOBODY, Traffic
-
-NO_SEGMENTS: FloatArray = np.zeros((0, 4))
-NO_CIRCLES: FloatArray = np.zeros((0, 3))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

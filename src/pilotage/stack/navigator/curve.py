@@ -111,8 +111,8 @@ class CurveNavigator:
         if path is None or config.spline is None:
             self._planned_only(route)
             return
-        absent = missing({"stack.localizer": parts.localizer, "stack.controller": parts.controller})
         if parts.localizer is None or parts.controller is None:
+            absent = missing({"stack.localizer": parts.localizer, "stack.controller": parts.controller})
             raise InputError(f"{NAME}: expected stack.localizer and stack.controller, found {absent}")
         grid = grid_of(chart, NAME)
         curve, self._reason = curve_along(route, grid, config.spline.clear)
