@@ -149,6 +149,14 @@ def test_how_long_legs_take_is_learnt_and_one_that_was_held_up_counts_little() -
     assert 9.0 < np.diff(legs.along_s(SPEED_M_S))[0] < 12.0
 
 
+def test_a_leg_that_was_held_up_once_is_as_fast_as_before_the_next_time_around() -> None:
+    """Who gave way to a mate for a round was taken for slow for five more, and mates kept off it."""
+    legs = LegTimes(Round.best(ring()))
+    for time_s in (9.0, 18.0, 8.0):
+        legs.took(0, time_s, SPEED_M_S)
+    assert np.diff(legs.along_s(SPEED_M_S))[0] == pytest.approx(8.0)
+
+
 @pytest.mark.parametrize(
     ("places", "late_s", "waits"),
     [(8, 0.0, False), (8, 6.0, True), (8, 2.0, False), (32, 0.0, False), (32, 3.0, False), (32, 5.0, True)],

@@ -8,7 +8,7 @@ from pilotage.core.types import FloatArray
 from pilotage.stack.patrol.tours import Round
 
 NEWEST = 0.3
-"""Weight of the last time around, from the second one on."""
+"""Weight of the last time around where it took longer than is known; a shorter time is believed at once."""
 MOST = 2.0
 """A leg is taken to last no longer than so many times as expected: who had to give way was held up once."""
 
@@ -18,6 +18,7 @@ class LegTimes:
 
     Turns, doors and walls make some legs slower than others, every time around: by metres alone robots
     evenly spread over a round seem to fall behind in its slow parts, and to run ahead in its fast ones.
+    What was driven can be driven: a shorter time is the leg's, a longer one may be a mate's giving way.
     """
 
     def __init__(self, walk: Round) -> None:
@@ -31,7 +32,8 @@ class LegTimes:
         if np.isnan(old_s):
             self._took_s[leg] = min(time_s, MOST * self.legs_m[leg] / max(speed_m_s, 1e-3))
         else:
-            self._took_s[leg] = old_s + NEWEST * (min(time_s, MOST * old_s) - old_s)
+            weight = NEWEST if time_s > old_s else 1.0
+            self._took_s[leg] = old_s + weight * (min(time_s, MOST * old_s) - old_s)
 
     def along_s(self, speed_m_s: float) -> FloatArray:
         """(K + 1,) time from the first stop to each, and all around; legs not driven yet at a speed."""
