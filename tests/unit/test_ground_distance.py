@@ -146,10 +146,20 @@ def test_the_field_of_a_large_map_takes_little_more_than_itself() -> None:
     assert peak < 2.5 * size + 150 * ground_distance.ROWS_AT_ONCE * field.distance_m.shape[1]
 
 
+def test_a_map_of_large_cells_is_not_searched_by_a_tenth_of_a_metre() -> None:
+    """60 x 40 cells of 10 m were 24 million nodes: half a minute for each plan at any angle."""
+    size_m = (0.0, 0.0, 600.0, 400.0)
+    cells = np.zeros((40, 60), dtype=np.int8)
+    cells[3:, 30] = 100
+    large = WorldMap("large", size_m, grid=OccupancyGrid(cells, 10.0, Pose2(0.0, 0.0, 0.0)))
+    assert large.field.resolution_m == 0.4
+    assert large.field.distance_m.size < ground_distance.ENOUGH_NODES
+
+
 def test_a_map_too_large_for_fine_nodes_has_coarser_ones(monkeypatch: pytest.MonkeyPatch) -> None:
     """It was refused: 'take a resolution coarser than 0.1 m', which nobody could say."""
     fine = coarse_chart().field
-    monkeypatch.setattr(ground_distance, "MAX_NODES", 50_000)
+    monkeypatch.setattr(ground_distance, "ENOUGH_NODES", 50_000)
     coarse = coarse_chart().field
     assert (fine.resolution_m, coarse.resolution_m) == (0.1, 0.2)
     np.testing.assert_allclose(coarse.distance_m, fine.distance_m[::2, ::2], atol=1e-9)

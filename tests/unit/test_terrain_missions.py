@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -272,3 +273,47 @@ def test_a_start_that_inflation_blocks_is_said(wall: Path) -> None:
     metrics = run(wall, "stack.navigator.cost_map.inflation_m=60", "world.start.x_m=275")
     assert not metrics["success"]
     assert "start blocked: the start, row 34 and column 27, is blocked" in metrics["reason"]
+
+
+def test_a_hazard_stepped_on_is_told_with_how_wrong_the_robot_was(wall: Path, tmp_path: Path) -> None:
+    """Its GPS is 15 m off, its plan keeps 0.46 m: that it stepped on a hazard was told, and not why."""
+    rover = {
+        "mission": "by-gps",
+        "world": {
+            "map": {"name": "images", "obstacles": str(wall), "resolution_m": 10},
+            "start": {"x_m": 275, "y_m": 345},
+            "goal": {"x_m": 325, "y_m": 345, "tolerance_m": 20},
+        },
+        "robot": {
+            "footprint": {"radius_m": 0.4},
+            "motion": {"name": "differential-drive", "max_speed_m_s": 5.0},
+            "sensors": {
+                "odometry": {"name": "wheel-odometry", "rate_hz": 5},
+                "gps": {"name": "gps", "rate_hz": 5, "position_std_m": 15.0},
+                "compass": {"name": "compass", "rate_hz": 5},
+            },
+        },
+        "task": "reach",
+        "stack": {
+            "navigator": "goal",
+            "localizer": "ekf-gps",
+            "planner": "theta-star",
+            "local_planner": "dubins",
+            "controller": "kanayama",
+        },
+        "run": {"dt_s": 0.2, "time_limit_s": 600},
+    }
+    (tmp_path / "rover.yaml").write_text(yaml.safe_dump(rover))
+    runs = [
+        run_mission(load_mission(str(tmp_path / "rover.yaml"), (), seed), save=False) for seed in range(4)
+    ]
+    beside = [run.metrics for run in runs if run.metrics["hazard_contacts"]]
+    assert beside
+    for metrics in beside:
+        told = re.fullmatch(
+            r"(\d+) of \d+ steps end on a hazard, where .* took itself to be up to (.*) m from its place",
+            str(metrics["reason"]),
+        )
+        assert told is not None
+        assert int(told[1]) == metrics["hazard_contacts"]
+        assert 0.2 < float(told[2]) < 10.0

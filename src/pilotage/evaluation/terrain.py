@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from pilotage.core.chi_square import chi_square_quantile
-from pilotage.core.types import FloatArray
+from pilotage.core.types import BoolArray, FloatArray
 from pilotage.evaluation.driving import covariances, poses
 from pilotage.evaluation.finished import FinishedRun, RobotRun
 from pilotage.evaluation.position_region import bent_regions, squared_off
@@ -64,7 +64,7 @@ def terrain_metrics(
         return {}
     away = columns["hazard_distance_m"]
     metrics: dict[str, object] = {
-        "hazard_contacts": hazard_contacts(truth, chart),
+        "hazard_contacts": int(np.count_nonzero(on_hazard(truth, chart))),
         "min_clearance_m": float(np.nanmin(away)) if np.isfinite(away).any() else math.nan,
         "end": {"x_m": truth[-1, 0], "y_m": truth[-1, 1], "theta_rad": truth[-1, 2]},
     }
@@ -90,15 +90,26 @@ def terrain_metrics(
     return metrics
 
 
-def hazard_contacts(truth: FloatArray, chart: WorldMap) -> int:
-    """How many of (N, 3) poses lie on a hazard or off the ground."""
+def on_hazard(truth: FloatArray, chart: WorldMap) -> BoolArray:
+    """(N,) whether (N, 3) poses lie on a hazard or off the ground."""
     grid = chart.grid
     if grid is None:
-        return 0
+        return np.zeros(len(truth), dtype=bool)
     cells = grid.cells_at(truth[:, :2])
-    inside = (cells >= 0).all(axis=1) & (cells[:, 0] < grid.rows) & (cells[:, 1] < grid.columns)
-    on_hazard = grid.blocked()[cells[inside, 0], cells[inside, 1]]
-    return int(np.count_nonzero(~inside) + np.count_nonzero(on_hazard))
+    off = (cells < 0).any(axis=1) | (cells[:, 0] >= grid.rows) | (cells[:, 1] >= grid.columns)
+    off[~off] = grid.blocked()[cells[~off, 0], cells[~off, 1]]
+    return off
+
+
+def why_on_hazard(robot: RobotRun, chart: WorldMap) -> str:
+    """How far from its place a robot took itself to be while it stood on hazards."""
+    truth = poses(robot.trace, "true")
+    there = on_hazard(truth, chart)
+    told = f"{np.count_nonzero(there)} of {len(there)} steps end on a hazard"
+    if robot.stack.localizer is None:
+        return told
+    off = (truth - poses(robot.trace, "est"))[there, :2]
+    return f"{told}, where the robot took itself to be up to {np.hypot(*off.T).max():.2f} m from its place"
 
 
 def hazard_distance_m(points_xy_m: FloatArray, grid: OccupancyGrid) -> FloatArray:

@@ -20,7 +20,7 @@ from pilotage.evaluation.least_time import least_drive_metrics
 from pilotage.evaluation.rounds import rounds_metrics, visited_steps
 from pilotage.evaluation.tasks.task import TASKS, Attempt, TaskSetting
 from pilotage.evaluation.tasks.watched import WatchedTask
-from pilotage.evaluation.terrain import terrain_columns, terrain_metrics
+from pilotage.evaluation.terrain import terrain_columns, terrain_metrics, why_on_hazard
 from pilotage.missions.places import GoalConfig
 
 
@@ -128,7 +128,7 @@ class ReachTask(WatchedTask):
                 f"({missed.x_m:g}, {missed.y_m:g})"
             )
         elif contacts:
-            metrics["reason"] = f"{contacts} of {run.steps} steps end on a hazard"
+            metrics["reason"] = why_on_hazard(robot, run.chart)
         return metrics
 
 
