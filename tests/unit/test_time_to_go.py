@@ -45,6 +45,16 @@ class TestTimeToGo:
             assert length_m <= 7.5 - x + 0.25
         assert len(eikonal.way_down(0.6, 1.57, time, time, 0.0, 0.0, 0.15, 0.25, 8)) == 9
 
+    def test_a_way_does_not_turn_back_at_its_goal(self) -> None:
+        """Its last steps went to and fro, and mates who followed one took it for coming against them."""
+        time = np.full((21, 61), np.inf)
+        time[10, 50] = 0.0
+        eikonal.sweep_down(time, np.full(time.shape, 1.0), 0.15)
+        for x in np.arange(0.6, 7.0, 0.1):
+            for y in (1.2, 1.57, 2.2):
+                legs = np.diff(eikonal.way_down(x, y, time, time, 0.0, 0.0, 0.15, 0.25, 100)[:, :2], axis=0)
+                assert ((legs[1:] * legs[:-1]).sum(axis=1) > 0.0).all()
+
     def test_a_disc_that_fills_the_only_door_leaves_no_way(self) -> None:
         slowness = np.ones((41, 61))
         slowness[:17, 30] = slowness[24:, 30] = np.inf

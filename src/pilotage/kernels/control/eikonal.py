@@ -197,29 +197,29 @@ def way_down(
 ) -> FloatArray:
     """The way down from a place: (steps + 1, 3) x, y, and ``values`` (rows, columns) at the nearest node.
 
-    It ends earlier off the grid, and where the goal is: where ``PAST`` steps lead no nearer to it.
+    It ends earlier off the grid, and where the goal is: where ``PAST`` steps lead no nearer to it, or to and
+    fro. What leads no nearer at its end is left out.
     """
     rows, columns = time.shape
     out = np.empty((steps + 1, 3))
-    count = nearest = 0
-    least = np.inf
-    for _ in range(steps + 1):
+    nearest, least = 0, np.inf
+    for count in range(1, steps + 2):
         row, column = round((y - y0) / spacing), round((x - x0) / spacing)
         if not (0 <= row < rows and 0 <= column < columns):
             break
-        out[count, 0], out[count, 1], out[count, 2] = x, y, values[row, column]
-        count += 1
+        out[count - 1, 0], out[count - 1, 1], out[count - 1, 2] = x, y, values[row, column]
         left = value_at(x, y, time, x0, y0, spacing, 0.0)
         if left < least - NEAR_S:
             least, nearest = left, count
         elif count >= nearest + PAST:
-            count = nearest
             break
         dx, dy = descent(x, y, time, x0, y0, spacing)
         if (dx == 0.0 and dy == 0.0) or time[row, column] < 0.5 * step:
             break
         x, y = x + step * dx, y + step * dy
-    return out[:count].copy()
+        if count > 1 and math.hypot(x - out[count - 2, 0], y - out[count - 2, 1]) < step:
+            break
+    return out[:nearest].copy()
 
 
 @kernel
