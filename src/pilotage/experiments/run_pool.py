@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 
 from pilotage.core.errors import InputError
 from pilotage.core.memory import look_seldom
+from pilotage.core.plugins import fault_of
 from pilotage.experiments import worker_processes
 from pilotage.experiments.worker_processes import interrupts_held, obey_the_parent
 
@@ -34,7 +35,7 @@ def all_done(work: Callable[..., R], jobs: Sequence[J], workers: int, what: str)
     done = False
     try:
         with interrupts_held():
-            waiting = {pool.submit(work, *job): job for job in jobs}
+            waiting = {pool.submit(blamed, work, *job): job for job in jobs}
         for future in as_completed(waiting):
             yield waiting[future], future.result()
         done = True
@@ -46,6 +47,24 @@ def all_done(work: Callable[..., R], jobs: Sequence[J], workers: int, what: str)
             for worker in set(multiprocessing.active_children()) - others:
                 worker.terminate()
         pool.shutdown(cancel_futures=True)
+
+
+def blamed(work: Callable[..., R], *job: Any) -> R:
+    """One job in a worker.
+
+    Raises
+    ------
+    InputError
+        For what a plugin raises: where it did so is lost on the way to the parent, and what ends a process
+        would end the pool. Whatever else the job raises.
+    """
+    try:
+        return work(*job)
+    except BaseException as error:
+        fault = None if isinstance(error, InputError) else fault_of(error)
+        if fault is None:
+            raise
+        raise InputError(fault.line) from None
 
 
 def _begin() -> None:

@@ -6,6 +6,7 @@ import contextlib
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from multiprocessing import resource_tracker
@@ -33,7 +34,12 @@ def interrupts_held() -> Iterator[None]:
 
 
 def obey_the_parent() -> None:
-    """Leave Ctrl-C, which goes to the whole group, to the parent, and end when that is gone."""
+    """Leave Ctrl-C, which goes to the whole group, to the parent, and end when that is gone.
+
+    Standard output is the parent's as well, maybe for one JSON object alone: what is printed goes to standard
+    error.
+    """
+    sys.stdout = sys.stderr
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if hasattr(signal, "pthread_sigmask"):
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})

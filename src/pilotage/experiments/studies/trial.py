@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from pilotage.core.errors import InputError
+from pilotage.core.plugins import fault_of
 from pilotage.evaluation.metrics import METRICS
 from pilotage.experiments.mission import mission_of
 from pilotage.experiments.run import run_mission
@@ -72,7 +73,9 @@ class TrialRunner:
             return measured(task.row, self.mission(task.overrides, task.seed))
         except InputError as error:
             return Outcome(task.row, {}, {}, str(error))
-        except Exception as error:  # what goes wrong in one trial is that trial's, not the study's
+        except BaseException as error:  # what goes wrong in one trial is that trial's, not the study's
+            if not isinstance(error, Exception) and fault_of(error) is None:
+                raise
             return Outcome(task.row, {}, {}, _said(error), retry=True)
 
     def mission(self, overrides: Sequence[str], seed: int) -> Mission:
@@ -95,9 +98,12 @@ def measured(row: int, mission: Mission) -> Outcome:
 
 
 def _said(error: BaseException) -> str:
-    """The error in one line."""
+    """The error in one line; a plugin's own by its file and line."""
     if isinstance(error, OSError) and error.errno == errno.ENOSPC:
         return f"disk full: {error.filename or error.strerror}"
+    fault = fault_of(error)
+    if fault is not None:
+        return " ".join(fault.line.split())[:REASON_LENGTH]
     words = " ".join(str(error).split())[:REASON_LENGTH]
     if isinstance(error, MemoryError):
         words = f"{words or 'out of memory'}; a worker's is bounded by --worker-memory"
