@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import dataclass
+import re
+from dataclasses import dataclass, replace
 from pathlib import Path as FilePath
 from types import SimpleNamespace
 from typing import Any
@@ -25,6 +26,8 @@ from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.sensors.readings import GpsFix, LidarScan
 from pilotage.sim.bodies.motion import SIMULATED_MOTIONS
+from pilotage.sim.faults.fault import FAULTS
+from pilotage.sim.people.people import PEOPLE
 from pilotage.sim.sensing.sensor import SIMULATED_SENSORS
 from pilotage.stack.control.controller import CONTROLLERS, Control
 from pilotage.stack.control.escape import ESCAPES
@@ -68,7 +71,7 @@ def control(v_m_s: Any) -> Control:
 
 
 def verdict(**metrics: object) -> Verdict:
-    return Verdict(metrics, (), {})
+    return Verdict(metrics, ({},), {})
 
 
 @dataclass(frozen=True)
@@ -95,21 +98,43 @@ GIVES: dict[str, tuple[Any, str]] = {
     "task": (TASKS, "judge"),
     "sensor": (SIMULATED_SENSORS, "read"),
     "motion": (SIMULATED_MOTIONS, "command"),
+    "words": (STRATEGIES, "words"),
+    "row": (TASKS, "row"),
+    "progress": (TASKS, "progress"),
+    "people": (PEOPLE, "step"),
+    "fault": (FAULTS, "pass_on"),
 }
+KEEPS: dict[str, dict[str, object]] = {
+    "planner": {"clearance_m": 0.3},
+    "localizer": {"belief": belief()},
+    "heading": {"USES": frozenset(), "estimate": HeadingEstimate(0.0, 0.1)},
+    "local controller": {"status": "driving"},
+    "navigator": {"belief": belief(), "status": (StackStatus.RUNNING, "")},
+    "mapper": {"circles_m": np.zeros((0, 3))},
+    "people": {"radius_m": np.full(1, 0.3)},
+    "task": {"columns": {"a_m": "m"}, "events": [], "goals": (), "drives": True},
+    "motion": {"moves": np.zeros((1, 3)), "spins_on": False, "release_m": 1e-6},
+}
+"""What a component of a role keeps from when it is built."""
 CALLED_WITH: dict[str, tuple[object, ...]] = {
     "planner": (ASKED,),
     "smoother": (AROUND, ASKED, 0.3),
     "strategy": (KNOWN,),
     "motion": (Twist(0.1, 0.0),),
+    "task": (SimpleNamespace(robots=[SimpleNamespace(trace={"t_s": np.zeros(3)})]),),
+    "fault": (1.0, (GpsFix(1.0, 2.0),)),
 }
 
 
 def made(role: str, gives: object, **members: object) -> Any:
     """A stranger's component of a role whose method gives this."""
     registry, method = GIVES[role]
-    roles = registry._gives if isinstance(registry._gives, tuple) else (registry._gives,)
-    methods: dict[str, object] = {each.method: lambda *_: gives for each in roles}
-    cls = type("Mine", (), {"__module__": "somebodys", "__slots__": (), **methods, **members})
+    roles = registry._gives
+    methods: dict[str, object] = {
+        each.method: lambda *_: gives for each in roles if each.method != "__init__"
+    }
+    keeps = KEEPS.get(registry.role, {})
+    cls = type("Mine", (), {"__module__": "somebodys", **methods, **keeps, **members})
     return getattr(checked(cls, f"{role} 'mine'", *roles)(), method)
 
 
@@ -135,6 +160,14 @@ def made(role: str, gives: object, **members: object) -> Any:
         ("sensor", None),
         ("sensor", GpsFix(1.0, 2.0)),
         ("sensor", OwnReading(1.0)),
+        ("mapper", False),
+        ("words", np.zeros(0)),
+        ("row", (NAN,)),
+        ("progress", (("gone", "3 m"),)),
+        ("task", verdict(success=True, reason="", gap_m=NAN, robots={"a": [1, None, np.int64(3)]})),
+        ("people", np.full((1, 2), NAN)),
+        ("fault", []),
+        ("fault", (GpsFix(3.0, 4.0),)),
     ],
 )
 def test_what_is_right_comes_through(role: str, gives: object) -> None:
@@ -147,7 +180,7 @@ def test_what_is_right_comes_through(role: str, gives: object) -> None:
         ("planner", "found", "found str 'found'"),
         ("planner", None, "found none"),
         ("planner", found(None), "found none that is found"),
-        ("planner", PlanResult("found", "", AROUND), "found a status str 'found'"),  # type: ignore[arg-type]
+        ("planner", PlanResult("found", "", AROUND), "PlanResult with status str 'found'"),  # type: ignore[arg-type]
         ("planner", found(NOWHERE), "Path with states nan in an array (9, 3)"),
         ("planner", found(WHOLE), "Path with states an array of int64"),
         ("planner", found(SPARSE), "states 2.42 m apart (at most 0.05 m"),
@@ -161,7 +194,7 @@ def test_what_is_right_comes_through(role: str, gives: object) -> None:
         ("localizer", belief(cov=EYE * NAN), "cov nan in an array (3, 3)"),
         ("localizer", belief(cov=CORRELATED), "a covariance with an eigenvalue of -1"),
         ("localizer", belief(cov=SKEW), "a covariance that is not symmetric"),
-        ("localizer", Belief(Pose2(0.0, 0.0, 0.0), EYE, "lost"), "a status str 'lost'"),  # type: ignore[arg-type]
+        ("localizer", Belief(Pose2(0.0, 0.0, 0.0), EYE, "lost"), "Belief with status str 'lost'"),  # type: ignore[arg-type]
         ("heading", HeadingEstimate(NAN, 0.0), "HeadingEstimate with heading_rad nan"),
         ("controller", Twist(0.1, 0.0), "found Twist(v_m_s="),
         ("controller", control(math.inf), "twist Twist with v_m_s inf"),
@@ -178,6 +211,41 @@ def test_what_is_right_comes_through(role: str, gives: object) -> None:
         ("sensor", GpsFix(NAN, 0.0), "GpsFix with x_m nan"),
         ("sensor", LidarScan([1.0]), "LidarScan with ranges_m list [1.0]"),  # type: ignore[arg-type]
         ("sensor", OwnReading(NAN), "OwnReading with depth_m nan"),
+        ("planner", found(replace(AROUND, length_m=-1.0)), "found length_m -1.0"),
+        ("planner", found(replace(AROUND, length_m=10**400)), "Path with length_m int 1000"),
+        ("planner", found(replace(AROUND, length_m=1e300)), "Path with length_m 1e+300"),
+        (
+            "planner",
+            found(replace(AROUND, waypoints=AROUND.waypoints + 1.0)),
+            "a path's waypoints whose start",
+        ),
+        ("planner", replace(found(AROUND), reason=3), "PlanResult with reason int 3"),  # type: ignore[arg-type]
+        ("planner", replace(found(AROUND), first="x"), "PlanResult with first str 'x'"),  # type: ignore[arg-type]
+        ("planner", replace(found(AROUND), first=NOWHERE), "PlanResult with first Path with states nan"),
+        ("planner", replace(found(AROUND), tree_edges_m=np.zeros((3, 2))), "tree_edges_m an array (3, 2)"),
+        ("local planner", LocalPath(AROUND.states[:1], 0.3), "found an array (1, 3)"),
+        ("local planner", LocalPath(AROUND.states, -0.3), "LocalPath with speed_m_s -0.3"),
+        ("localizer", belief(1e300), "Pose2 with x_m 1e+300"),
+        ("heading", HeadingEstimate(0.0, -0.1), "HeadingEstimate with variance_rad2 -0.1"),
+        ("reactive", Reaction("avoid", 0.0, 1.0, 1.0), "Reaction with kind str 'avoid'"),  # type: ignore[arg-type]
+        ("reactive", Reaction(ReactionKind.AVOID, 0.0, NAN, 1.0), "Reaction with speed_limit_m_s nan"),
+        ("reactive", Reaction(ReactionKind.AVOID, 0.0, -1.0, 1.0), "Reaction with speed_limit_m_s -1.0"),
+        ("mapper", None, "found none"),
+        ("words", None, "found none"),
+        ("words", np.zeros((2, 2)), "an array (2, 2) instead of (N,)"),
+        ("row", (), "found tuple ()"),
+        ("row", ("x",), "found str 'x'"),
+        ("progress", (("gone", 3.0),), "found tuple (('gone', 3.0),)"),
+        ("task", Verdict({"success": True, "reason": ""}, (), {}), "found columns tuple () of 1 robots"),
+        ("task", verdict(success=True, reason="", mine=object()), "found mine object <object"),
+        ("task", verdict(success=True, reason="", mine={"a": 10**400}), "found mine a int 1000"),
+        ("people", [[1.0, 2.0]], "found list [[1.0, 2.0]]"),
+        ("people", np.zeros((2, 2)), "an array (2, 2) of 1 people"),
+        ("people", np.full((1, 2), math.inf), "inf in an array (1, 2)"),
+        ("fault", None, "found none"),
+        ("fault", (GpsFix(NAN, 0.0),), "GpsFix with x_m nan"),
+        ("fault", (1.0,), "found float 1.0"),
+        ("fault", (LidarScan(np.zeros(3)),), "found LidarScan("),
     ],
 )
 def test_what_is_not_is_refused_by_name(role: str, gives: object, told: str) -> None:
@@ -185,28 +253,102 @@ def test_what_is_not_is_refused_by_name(role: str, gives: object, told: str) -> 
     _, method = GIVES[role]
     with pytest.raises(InputError) as refused:
         made(role, gives)(*CALLED_WITH.get(role, ()))
-    assert str(refused.value).startswith(f"{role} 'mine' of 'somebodys': {method}: expected a")
+    assert str(refused.value).startswith(f"{role} 'mine' of 'somebodys': {method}: expected ")
     assert told in str(refused.value)
 
 
+@pytest.mark.parametrize(
+    ("role", "name", "value", "told"),
+    [
+        ("planner", "clearance_m", None, "clearance_m none"),
+        ("planner", "clearance_m", -1.0, "clearance_m -1.0"),
+        ("localizer", "belief", None, "belief none"),
+        (
+            "navigator",
+            "belief",
+            Belief(Pose2(NAN, 0.0, 0.0), EYE),
+            "belief Belief with pose Pose2 with x_m nan",
+        ),
+        ("navigator", "belief", belief(cov=CORRELATED), "belief a covariance with an eigenvalue of -1"),
+        ("navigator", "status", "arrived", "status str 'arrived'"),
+        ("navigator", "status", ("arrived", ""), "status tuple ('arrived', '')"),
+        ("mapper", "circles_m", np.zeros((2, 2)), "circles_m an array (2, 2) instead of (N, 3)"),
+        ("mapper", "circles_m", np.full((1, 3), -1.0), "circles_m a radius of -1.0"),
+        ("heading", "USES", ["gyroscope"], "USES list ['gyroscope']"),
+        ("heading", "USES", frozenset({"nose"}), "USES frozenset({'nose'})"),
+        ("heading", "estimate", None, "estimate none"),
+        ("people", "radius_m", 0.3, "radius_m float 0.3"),
+        ("people", "radius_m", np.zeros(1), "radius_m [0.]"),
+        ("motion", "moves", np.zeros((0, 3)), "moves an array (0, 3)"),
+        ("motion", "moves", np.full((1, 3), NAN), "moves nan in an array (1, 3)"),
+        ("motion", "spins_on", None, "spins_on none"),
+        ("motion", "release_m", "x", "release_m str 'x'"),
+        ("task", "columns", {1: "m"}, "columns with int 1: str 'm'"),
+        ("task", "events", (), "events tuple ()"),
+        ("task", "goals", (1,), "goals tuple (1,)"),
+        ("task", "drives", None, "drives none"),
+    ],
+)
+def test_what_a_component_keeps_is_looked_at_when_it_is_built(
+    role: str, name: str, value: object, told: str
+) -> None:
+    """It came to light far away, in lines of our own, or never."""
+    with pytest.raises(InputError, match=re.escape(f"found {told}")) as refused:
+        made(role, None, **{name: value})
+    assert str(refused.value).startswith(f"{role} 'mine' of 'somebodys': expected ")
+
+
 def test_what_a_component_keeps_is_looked_at_with_what_it_gives() -> None:
-    lost = Belief(Pose2(NAN, 0.0, 0.0), EYE, BeliefStatus.LOST)
-    for role, gives, kept in (
-        ("navigator", Twist(0.1, 0.0), {"belief": lost}),
-        ("navigator", Twist(0.1, 0.0), {"belief": belief(), "status": "arrived"}),
-        ("navigator", Twist(0.1, 0.0), {"belief": belief(), "status": ("arrived", "")}),
-        ("navigator", Twist(0.1, 0.0), {"belief": belief()}),
-        ("navigator", Twist(0.1, 0.0), {"status": (StackStatus.RUNNING, "")}),
-        ("mapper", True, {"circles_m": np.zeros((2, 2))}),
-        ("motion", None, {"moves": np.full((1, 3), NAN)}),
+    for role, gives, name, value in (
+        ("navigator", Twist(0.1, 0.0), "belief", Belief(Pose2(NAN, 0.0, 0.0), EYE, BeliefStatus.LOST)),
+        ("navigator", Twist(0.1, 0.0), "status", "arrived"),
+        ("localizer", belief(), "belief", None),
+        ("local controller", Twist(0.1, 0.0), "status", 3),
+        ("mapper", False, "circles_m", np.zeros((2, 2))),
+        ("people", np.zeros((1, 2)), "radius_m", np.zeros(1)),
+        ("motion", None, "moves", np.full((1, 3), NAN)),
+        ("motion", None, "moves", np.zeros((2, 3))),
     ):
-        with pytest.raises(InputError, match=f"{role} 'mine' of 'somebodys'"):
-            made(role, gives, **kept)(*CALLED_WITH.get(role, ()))
+        method = made(role, gives)
+        setattr(method.__self__, name, value)
+        with pytest.raises(InputError, match=f"{role} 'mine' of 'somebodys': .*: expected"):
+            method(*CALLED_WITH.get(role, ()))
+
+
+class TakesOne:
+    def __init__(self, config: object) -> None:
+        """Nothing."""
+
+
+class TakesWords:
+    def __init__(self, *, config: object) -> None:
+        """Nothing."""
+
+
+class TakesNothing:
+    """It has no constructor."""
+
+
+@pytest.mark.parametrize(("base", "found"), [(TakesOne, "(self, config)"), (TakesWords, "(self, *, config)")])
+def test_one_that_cannot_be_built_as_its_role_says_is_refused(base: type, found: str) -> None:
+    """It was a TypeError of ours."""
+    members = {"__module__": "somebodys", "step": lambda *_: None}
+    cls = checked(type("Mine", (base,), members), "controller 'mine'", *CONTROLLERS._gives)
+    told = f"^controller 'mine' of 'somebodys': expected to be built from 2 arguments .*{re.escape(found)}"
+    with pytest.raises(InputError, match=told):
+        cls(1, 2)
+
+
+def test_one_without_a_constructor_is_built_from_nothing() -> None:
+    members = {"__module__": "somebodys", "step": lambda *_: None}
+    cls = checked(type("Mine", (TakesNothing,), members), "controller 'mine'", *CONTROLLERS._gives)
+    assert cls()
+    with pytest.raises(InputError, match="expected to be built from 2 arguments"):
+        cls(1, 2)
 
 
 def test_a_navigator_that_says_how_far_it_is_drives() -> None:
-    kept = {"belief": belief(), "status": (StackStatus.RUNNING, "")}
-    assert made("navigator", Twist(0.1, 0.0), **kept)() == Twist(0.1, 0.0)
+    assert made("navigator", Twist(0.1, 0.0))() == Twist(0.1, 0.0)
 
 
 def test_one_without_its_roles_method_is_refused_as_it_registers() -> None:

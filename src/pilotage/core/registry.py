@@ -12,9 +12,10 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
-from pilotage.core.checked import Gives, checked, told
+from pilotage.core.checked import Gives, checked
 from pilotage.core.config import Config, validate
 from pilotage.core.errors import InputError, unknown_name
+from pilotage.core.misfit import told
 from pilotage.core.plugins import giver, load_plugins, take
 
 RENAMED = {"ekf-slow-errors": "ekf-gauss-markov", "mcl-likelihood-field": "particle-filter"}

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from pilotage.core.errors import InputError
 from pilotage.core.files.arrays import read_npz, require_numbers
 from pilotage.core.limits import MB, limit
+from pilotage.core.misfit import LARGEST
 from pilotage.core.types import FloatArray, IntArray
-from pilotage.records.numbers import FARTHEST_M, LARGEST
+from pilotage.records.numbers import FARTHEST_M
 from pilotage.records.reading import is_there
 
 ARCHIVE_BYTES = 128 * MB

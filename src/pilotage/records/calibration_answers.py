@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from pilotage.core.config import describe
-from pilotage.records.numbers import LARGEST
+from pilotage.core.misfit import LARGEST
 
 Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST, allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0.0, le=LARGEST)]

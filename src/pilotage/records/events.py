@@ -8,9 +8,9 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from pilotage.core.checked import told
 from pilotage.core.errors import InputError
 from pilotage.core.files import read_json_lines
+from pilotage.core.misfit import told
 from pilotage.core.types import Event
 from pilotage.records.numbers import number
 from pilotage.records.reading import clean_text, is_there

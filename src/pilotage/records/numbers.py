@@ -6,10 +6,9 @@ import math
 
 import numpy as np
 
+from pilotage.core.misfit import LARGEST
 from pilotage.core.types import FloatArray
 
-LARGEST = 1e30
-"""No quantity of a run is larger; squares and products of such values stay finite."""
 FARTHEST_M = 1e9
 """No place on a map is farther from its origin."""
 

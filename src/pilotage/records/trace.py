@@ -14,8 +14,8 @@ from pilotage.core.errors import InputError
 from pilotage.core.files.parquet import arrow_table, parquet_metadata, read_parquet
 from pilotage.core.json_text import load_json
 from pilotage.core.limits import MB
+from pilotage.core.misfit import LARGEST
 from pilotage.core.types import FloatArray, IntArray
-from pilotage.records.numbers import LARGEST
 from pilotage.records.reading import clean_text, is_there
 
 TRACE_FILE = "trace.parquet"

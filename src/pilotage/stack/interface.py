@@ -9,7 +9,8 @@ from typing import Protocol
 
 import numpy as np
 
-from pilotage.core.checked import Gives, misfit, told
+from pilotage.core.checked import Gives, keeps
+from pilotage.core.misfit import kept, misfit, told
 from pilotage.core.registry import Registry
 from pilotage.core.scan_update import LineVerdict as LineVerdict
 from pilotage.core.scan_update import ScanUpdate as ScanUpdate
@@ -114,11 +115,36 @@ class Stack(Protocol):
         ...
 
 
-def _unfit(given: object, stack: Stack, *_: object) -> str:
-    status = getattr(stack, "status", None)
+LEAST_EIGENVALUE = -1e-9
+"""Of a covariance, as a share of its largest: what rounding may leave below zero."""
+
+
+def unfit_belief(given: object) -> str:
+    """Why a value is no belief with a covariance; empty: it is."""
+    wrong = misfit(given, Belief)
+    if wrong or not isinstance(given, Belief):
+        return wrong
+    cov = given.cov
+    if cov.shape != (3, 3):
+        return f"a covariance {cov.shape}"
+    if not np.allclose(cov, cov.T):
+        return "a covariance that is not symmetric"
+    values = np.linalg.eigvalsh(cov)
+    low, high = float(values[0]), float(values[-1])
+    return f"a covariance with an eigenvalue of {low:g}" if low < LEAST_EIGENVALUE * max(high, 0.0) else ""
+
+
+def _unfit_kept(stack: Stack) -> str:
+    wrong = unfit_belief(kept(stack, "belief"))
+    if wrong:
+        return f"belief {wrong}"
+    status = kept(stack, "status")
     pair = isinstance(status, tuple) and [type(part) for part in status] == [StackStatus, str]
-    wrong = misfit(given, (Twist, WheelSpeeds)) or misfit(getattr(stack, "belief", None), Belief)
-    return wrong or ("" if pair else f"status {told(status)}")
+    return "" if pair else f"status {told(status)}"
+
+
+def _unfit(given: object, stack: Stack, *_: object) -> str:
+    return misfit(given, (Twist, WheelSpeeds)) or _unfit_kept(stack)
 
 
 NAVIGATORS: Registry[Stack] = Registry(
@@ -127,6 +153,7 @@ NAVIGATORS: Registry[Stack] = Registry(
     "pilotage.stack.exploration",
     "pilotage.replicas",
     gives=(
+        keeps("a Belief of finite numbers, and as status a StackStatus and why", _unfit_kept),
         Gives(
             "step",
             "a Twist or WheelSpeeds and a Belief of finite numbers, and as status a StackStatus and why",

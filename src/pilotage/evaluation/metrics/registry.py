@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import math
-import numbers
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from types import MappingProxyType
 
-from pilotage.core.checked import told
 from pilotage.core.errors import InputError, nearest
+from pilotage.core.misfit import told, unfit_number
 from pilotage.core.plugins import giver, load_plugins, take
 from pilotage.core.types import FloatArray
 from pilotage.evaluation.metric import Clock, Compute, Metric, unnamed
@@ -119,7 +117,7 @@ class Metrics:
             value = metric.compute(trace, metrics)
             if value is None:
                 continue
-            if not isinstance(value, numbers.Real) or not math.isfinite(value):
+            if unfit_number(value):
                 raise InputError(
                     f"metric '{metric.key}' of {giver(metric.compute.__module__)}: expected a finite number, "
                     f"or None of a run that does not give it, found {told(value)}"

@@ -6,12 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
-import numpy as np
-
-from pilotage.core.checked import Gives, told
+from pilotage.core.checked import Gives, keeps
 from pilotage.core.registry import Registry
 from pilotage.core.types import Event
 from pilotage.evaluation.finished import FinishedRun, Verdict
+from pilotage.evaluation.tasks.given import unfit_ending, unfit_kept, unfit_progress, unfit_row, unfit_verdict
 from pilotage.maps.world_map import WorldMap
 from pilotage.missions.mission import Mission
 from pilotage.missions.places import GoalConfig
@@ -85,25 +84,15 @@ class Task(Protocol):
         ...
 
 
-def _unfit_ending(given: object, *_: object) -> str:
-    return "" if given is None or isinstance(given, str) else told(given)
-
-
-def _unfit_verdict(given: object, *_: object) -> str:
-    if not isinstance(given, Verdict):
-        return told(given)
-    success, reason = (given.metrics.get(key) for key in ("success", "reason"))
-    if not isinstance(success, bool | np.bool_):
-        return f"success {told(success)}"
-    return "" if isinstance(reason, str) else f"reason {told(reason)}"
-
-
 TASKS: Registry[Task] = Registry(
     "task",
     "pilotage.evaluation.tasks",
     gives=(
-        Gives("step", "why the run is over, or None", _unfit_ending),
-        Gives("judge", "a Verdict with success, true or false, and a reason", _unfit_verdict),
+        keeps("columns with their units, a list of events, a tuple of goals, and drives", unfit_kept),
+        Gives("row", "a tuple of numbers, one a column", unfit_row),
+        Gives("progress", "a tuple of (label, text) each", unfit_progress),
+        Gives("step", "why the run is over, or None", unfit_ending),
+        Gives("judge", "a Verdict with success, true or false, and a reason", unfit_verdict),
     ),
 )
 

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from pilotage.core.checked import Gives, unfit_array
+import numpy as np
+
+from pilotage.core.checked import Gives, keeps
 from pilotage.core.errors import InputError
+from pilotage.core.misfit import kept, told, unfit_array, unfit_number
 from pilotage.core.types import Command, FloatArray, Twist
 from pilotage.sim.by_config import ByConfig
 
@@ -47,12 +50,30 @@ class SimulatedMotion(Protocol):
         ...
 
 
+def _unfit_kept(motion: SimulatedMotion) -> str:
+    moves = kept(motion, "moves")
+    wrong = unfit_array(moves, 3) or ("" if len(moves) else f"an array {moves.shape}")
+    if wrong:
+        return f"moves {wrong}"
+    spins_on, release_m = (kept(motion, name) for name in ("spins_on", "release_m"))
+    if not isinstance(spins_on, bool | np.bool_):
+        return f"spins_on {told(spins_on)}"
+    # The body's arrays are as long as these.
+    motion.moves_a_step = len(moves)  # type: ignore[attr-defined]
+    return unfit_number(release_m) and f"release_m {unfit_number(release_m)}"
+
+
 def _unfit(_: None, motion: SimulatedMotion, *__: object) -> str:
-    return unfit_array(motion.moves, 3)
+    wrong = unfit_array(motion.moves, 3)
+    count: int = motion.moves_a_step  # type: ignore[attr-defined]
+    return wrong or ("" if len(motion.moves) == count else f"{len(motion.moves)} moves instead of {count}")
 
 
 SIMULATED_MOTIONS: ByConfig[SimulatedMotion] = ByConfig(
-    "motion", "pilotage.sim.bodies", Gives("command", "moves (K, 3) of finite numbers", _unfit)
+    "motion",
+    "pilotage.sim.bodies",
+    keeps("moves (K, 3) of numbers, K never another, spins_on and release_m", _unfit_kept),
+    Gives("command", "moves (K, 3) of finite numbers", _unfit),
 )
 """Data sheets to what they truly do."""
 

@@ -8,7 +8,9 @@ from typing import Protocol
 
 import numpy as np
 
+from pilotage.core.checked import Gives
 from pilotage.core.config import Config
+from pilotage.core.misfit import misfit, told
 from pilotage.core.registry import Registry
 from pilotage.core.types import IntArray
 from pilotage.sensors.readings import BeaconReadings, OdometryIncrement, Reading
@@ -50,7 +52,18 @@ class Fault(Protocol):
         ...
 
 
-FAULTS: Registry[Fault] = Registry("fault", "pilotage.sim.faults")
+def _unfit(given: object, _: Fault, __: float, readings: Sequence[Reading]) -> str:
+    if not isinstance(given, tuple | list):
+        return told(given)
+    kinds = tuple({type(reading) for reading in readings}) or tuple({type(reading) for reading in given})
+    return next((wrong for reading in given if (wrong := misfit(reading, kinds))), "")
+
+
+FAULTS: Registry[Fault] = Registry(
+    "fault",
+    "pilotage.sim.faults",
+    gives=(Gives("pass_on", "a list or tuple of readings as they set out, of finite numbers", _unfit),),
+)
 """Faults by name, as ``robot.faults`` lists them."""
 
 

@@ -7,6 +7,8 @@ from typing import Protocol
 
 import numpy as np
 
+from pilotage.core.checked import Gives, keeps
+from pilotage.core.misfit import kept, unfit_array
 from pilotage.core.registry import Registry
 from pilotage.core.types import FloatArray
 from pilotage.sim.worlds.world import World
@@ -76,5 +78,26 @@ class People(Protocol):
         ...
 
 
-PEOPLE: Registry[People] = Registry("people", "pilotage.sim.people")
+def _unfit_kept(people: People) -> str:
+    radius_m = kept(people, "radius_m")
+    wrong = unfit_array(radius_m, None) or ("" if (radius_m > 0.0).all() else f"{radius_m}")
+    return f"radius_m {wrong}" if wrong else ""
+
+
+def _unfit(given: object, people: People, *_: object) -> str:
+    wrong = unfit_array(given, 2, untold=True) or _unfit_kept(people)
+    if wrong or not isinstance(given, np.ndarray):
+        return wrong
+    count = len(people.radius_m)
+    return "" if len(given) == count else f"an array {given.shape} of {count} people"
+
+
+PEOPLE: Registry[People] = Registry(
+    "people",
+    "pilotage.sim.people",
+    gives=(
+        keeps("radius_m (K,) of numbers above 0", _unfit_kept),
+        Gives("step", "places (K, 2) of numbers, NaN for who is not there", _unfit),
+    ),
+)
 """Plans by name, as ``world.people`` lists them."""

@@ -8,7 +8,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from pilotage.core.checked import Gives, misfit
+from pilotage.core.checked import Gives
+from pilotage.core.misfit import misfit
 from pilotage.core.types import FloatArray
 from pilotage.sensors.readings import Reading
 from pilotage.sensors.sensor import Mount

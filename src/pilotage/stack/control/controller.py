@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-from pilotage.core.checked import Gives, misfit
+from pilotage.core.checked import Gives
+from pilotage.core.misfit import misfit
 from pilotage.core.registry import Registry
 from pilotage.core.types import Pose2, Twist
 

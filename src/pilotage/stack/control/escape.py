@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from pilotage.core.checked import Gives, misfit
+from pilotage.core.checked import Gives
+from pilotage.core.misfit import misfit
 from pilotage.core.registry import Registry
 from pilotage.core.types import Pose2, Twist
 

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol
 
-from pilotage.core.checked import Gives, misfit
+from pilotage.core.checked import Gives
+from pilotage.core.misfit import misfit
 from pilotage.core.registry import Registry
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.maps.near_walls import NearWalls
@@ -60,7 +61,10 @@ class Reactive(Protocol):
 
 
 def _unfit(given: object, *_: object) -> str:
-    return misfit(given, Reaction, ("speed_limit_m_s", "front_m"))
+    wrong = misfit(given, Reaction, unlimited=("speed_limit_m_s", "front_m"))
+    if wrong or not isinstance(given, Reaction) or given.speed_limit_m_s >= 0.0:
+        return wrong
+    return f"Reaction with speed_limit_m_s {given.speed_limit_m_s}"
 
 
 REACTIVES: Registry[Reactive] = Registry(

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
-from pilotage.core.checked import Gives, misfit
+from pilotage.core.checked import Gives, keeps
 from pilotage.core.config import Config
+from pilotage.core.misfit import kept, misfit, told
 from pilotage.core.registry import Registry
 from pilotage.sensors.sensor import NonNegative, Positive
 
@@ -81,13 +82,30 @@ class HeadingErrors(Config):
     """The report's R of 11, read as squared degrees."""
 
 
+USABLE = frozenset({"gyroscope", "magnetometer"})
+
+
+def _unfit_kept(heading: HeadingFilter) -> str:
+    uses = kept(heading, "USES")
+    if not isinstance(uses, set | frozenset) or not uses <= USABLE:
+        return f"USES {told(uses)}"
+    wrong = _unfit(kept(heading, "estimate"))
+    return f"estimate {wrong}" if wrong else ""
+
+
+def _unfit(given: object, *_: object) -> str:
+    wrong = misfit(given, HeadingEstimate)
+    if wrong or not isinstance(given, HeadingEstimate) or given.variance_rad2 >= 0.0:
+        return wrong
+    return f"HeadingEstimate with variance_rad2 {given.variance_rad2}"
+
+
 HEADING_FILTERS: Registry[HeadingFilter] = Registry(
     "heading",
     "pilotage.stack.localization",
     "pilotage.replicas",
     gives=(
-        Gives(
-            "step", "a HeadingEstimate of finite numbers", lambda given, *_: misfit(given, HeadingEstimate)
-        ),
+        keeps("a HeadingEstimate, and as USES a set of gyroscope, magnetometer or none", _unfit_kept),
+        Gives("step", "a HeadingEstimate of finite numbers", _unfit),
     ),
 )

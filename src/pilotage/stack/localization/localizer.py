@@ -6,15 +6,14 @@ from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import Protocol
 
-import numpy as np
-
-from pilotage.core.checked import Gives, misfit, told
+from pilotage.core.checked import Gives, keeps
 from pilotage.core.errors import InputError
+from pilotage.core.misfit import kept
 from pilotage.core.registry import Registry
 from pilotage.core.types import FloatArray
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.readings import Readings
-from pilotage.stack.interface import Belief, BeliefStatus
+from pilotage.stack.interface import Belief, BeliefStatus, unfit_belief
 from pilotage.stack.mapping.scan_grid import ScanGrid
 
 
@@ -132,29 +131,21 @@ def require_initial_pose(initial: Belief, name: str) -> None:
         )
 
 
-LEAST_EIGENVALUE = -1e-9
-"""Of a covariance, as a share of its largest: what rounding may leave below zero."""
+def _unfit_kept(localizer: Localizer) -> str:
+    wrong = unfit_belief(kept(localizer, "belief"))
+    return f"belief {wrong}" if wrong else ""
 
 
-def _unfit(given: object, *_: object) -> str:
-    wrong = misfit(given, Belief)
-    if wrong or not isinstance(given, Belief):
-        return wrong
-    if not isinstance(given.status, BeliefStatus):
-        return f"a status {told(given.status)}"
-    cov = given.cov
-    if cov.shape != (3, 3):
-        return f"a covariance {cov.shape}"
-    if not np.allclose(cov, cov.T):
-        return "a covariance that is not symmetric"
-    values = np.linalg.eigvalsh(cov)
-    low, high = float(values[0]), float(values[-1])
-    return f"a covariance with an eigenvalue of {low:g}" if low < LEAST_EIGENVALUE * max(high, 0.0) else ""
+def _unfit(given: object, localizer: Localizer, *_: object) -> str:
+    return unfit_belief(given) or ("" if kept(localizer, "belief") is given else _unfit_kept(localizer))
 
 
 LOCALIZERS: Registry[Localizer] = Registry(
     "localizer",
     "pilotage.stack.localization",
     "pilotage.replicas",
-    gives=(Gives("step", "a Belief of finite pose and positive covariance (3, 3)", _unfit),),
+    gives=(
+        keeps("as belief a Belief of finite pose and positive covariance (3, 3)", _unfit_kept),
+        Gives("step", "a Belief of finite pose and positive covariance (3, 3)", _unfit),
+    ),
 )

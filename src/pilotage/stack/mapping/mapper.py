@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from pilotage.core.checked import Gives, unfit_array
+import numpy as np
+
+from pilotage.core.checked import Gives, keeps
+from pilotage.core.misfit import kept, told, unfit_array
 from pilotage.core.registry import Registry
 from pilotage.core.types import FloatArray
 from pilotage.sensors.readings import Readings
@@ -27,12 +30,23 @@ class Mapper(Protocol):
         ...
 
 
+def _unfit_kept(mapper: Mapper) -> str:
+    circles = kept(mapper, "circles_m")
+    wrong = unfit_array(circles, 3)
+    if not wrong and (circles[:, 2] < 0.0).any():
+        wrong = f"a radius of {circles[:, 2].min()}"
+    return f"circles_m {wrong}" if wrong else ""
+
+
 def _unfit(added: object, mapper: Mapper, *_: object) -> str:
-    return unfit_array(mapper.circles_m, 3) if added else ""
+    return _unfit_kept(mapper) if isinstance(added, bool | np.bool_) else told(added)
 
 
 MAPPERS: Registry[Mapper] = Registry(
     "mapper",
     "pilotage.stack.mapping",
-    gives=(Gives("step", "circles_m (M, 3) of finite numbers", _unfit),),
+    gives=(
+        keeps("circles_m (M, 3) of finite numbers", _unfit_kept),
+        Gives("step", "true or false, and circles_m (M, 3) of finite numbers", _unfit),
+    ),
 )

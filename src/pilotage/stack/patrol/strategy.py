@@ -7,7 +7,8 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from pilotage.core.checked import Gives, told
+from pilotage.core.checked import Gives
+from pilotage.core.misfit import told, unfit_array
 from pilotage.core.registry import Registry
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.stack.patrol.graph import PatrolGraph
@@ -114,7 +115,10 @@ def _unfit(given: object, _: Strategy, knowledge: PatrolKnowledge) -> str:
 STRATEGIES: Registry[Strategy] = Registry(
     "strategy",
     "pilotage.stack.patrol.strategies",
-    gives=(Gives("next_vertex", "a vertex's number", _unfit),),
+    gives=(
+        Gives("next_vertex", "a vertex's number", _unfit),
+        Gives("words", "an array (K,) of finite numbers", lambda given, *_: unfit_array(given, None)),
+    ),
 )
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-from pilotage.core.checked import Gives, misfit, unfit_array
+from pilotage.core.checked import Gives
+from pilotage.core.misfit import misfit, unfit_array
 from pilotage.core.registry import Registry
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.maps.near_walls import NearWalls
@@ -18,9 +19,9 @@ class LocalPath:
     Attributes
     ----------
     states
-        (N, 3) x, y, theta; the first is where the plan was made from.
+        (N, 3) x, y, theta, two or more; the first is where the plan was made from.
     speed_m_s
-        Constant speed along them.
+        Constant speed along them, above 0.
     """
 
     states: FloatArray
@@ -63,11 +64,15 @@ def _unfit(given: object, *_: object) -> str:
     if given is None:
         return ""
     wrong = misfit(given, LocalPath)
-    return wrong or (unfit_array(given.states, 3) if isinstance(given, LocalPath) else "")
+    if wrong or not isinstance(given, LocalPath):
+        return wrong
+    states, speed_m_s = given.states, given.speed_m_s
+    wrong = unfit_array(states, 3) or ("" if len(states) > 1 else f"an array {states.shape}")
+    return wrong or ("" if speed_m_s > 0.0 else f"LocalPath with speed_m_s {speed_m_s}")
 
 
 LOCAL_PLANNERS: Registry[LocalPlanner] = Registry(
     "local planner",
     "pilotage.stack.planning",
-    gives=(Gives("plan", "a LocalPath of states (N, 3) of finite numbers, or None", _unfit),),
+    gives=(Gives("plan", "a LocalPath of two states (N, 3) or more and a speed above 0, or None", _unfit),),
 )

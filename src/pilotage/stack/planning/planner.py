@@ -11,8 +11,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pilotage.core.checked import Gives, misfit, told, unfit_array
+from pilotage.core.checked import Gives, keeps
 from pilotage.core.errors import InputError
+from pilotage.core.misfit import kept, misfit, unfit_array, unfit_number
 from pilotage.core.registry import Registry
 from pilotage.core.types import FloatArray, Goal, Pose2
 from pilotage.maps.distance_field import DistanceField
@@ -188,14 +189,16 @@ class Smoother(Protocol):
 
 
 def _unfit_plan(given: object, _: Planner, request: PlanRequest) -> str:
-    wrong = misfit(given, PlanResult, ("first_solution_s", "planning_time_s"))
+    wrong = misfit(given, PlanResult, untold=("first_solution_s", "planning_time_s"))
     if wrong or not isinstance(given, PlanResult):
         return wrong
-    if not isinstance(given.status, PlanStatus):
-        return f"a status {told(given.status)}"
+    wrong = unfit_array(given.tree_edges_m, 4)
+    if wrong:
+        return f"tree_edges_m {wrong}"
     if given.path is None:
         return "none that is found" if given.status is PlanStatus.FOUND else ""
-    return _unfit_path(given.path, request)
+    wrong = "" if given.first is None else _unfit_arrays(given.first)
+    return f"a first path with {wrong}" if wrong else _unfit_path(given.path, request)
 
 
 def _unfit_smoothed(given: object, _: Smoother, __: Path, request: PlanRequest, *___: object) -> str:
@@ -207,15 +210,15 @@ def _unfit_path(given: object, request: PlanRequest) -> str:
     wrong = misfit(given, Path)
     if wrong or not isinstance(given, Path):
         return wrong
-    for what, array in (("states", given.states), ("waypoints", given.waypoints)):
-        unfit = unfit_array(array, 3) or ("" if len(array) > 1 else f"an array {array.shape}")
-        if unfit:
-            return f"{what}: {unfit}"
+    wrong = _unfit_arrays(given)
+    if wrong:
+        return wrong
     states, start, goal = given.states[:, :2], request.start, request.goal
-    for what, place, end in (("start", start, states[0]), ("goal", goal, states[-1])):
-        apart_m = math.hypot(end[0] - place.x_m, end[1] - place.y_m)
-        if apart_m > max(SPACING_M, request.field.resolution_m):
-            return f"a path whose {what} is {apart_m:.2f} m away from where it was asked for"
+    for whose, each in (("path", given.states), ("path's waypoints", given.waypoints)):
+        for what, place, end in (("start", start, each[0]), ("goal", goal, each[-1])):
+            apart_m = math.hypot(end[0] - place.x_m, end[1] - place.y_m)
+            if apart_m > max(SPACING_M, request.field.resolution_m):
+                return f"a {whose} whose {what} is {apart_m:.2f} m away from where it was asked for"
     apart_m = float(np.hypot(*np.diff(states, axis=0).T).max())
     if apart_m > SPACING_M * (1.0 + 1e-6):
         return f"states {apart_m:.2f} m apart (at most {SPACING_M:g} m; Path.through puts them in between)"
@@ -229,10 +232,29 @@ def _unfit_path(given: object, request: PlanRequest) -> str:
     return ""
 
 
+def _unfit_arrays(path: Path) -> str:
+    """Why the arrays and lengths of a path are none of a path."""
+    for what, array in (("states", path.states), ("waypoints", path.waypoints)):
+        unfit = unfit_array(array, 3) or ("" if len(array) > 1 else f"an array {array.shape}")
+        if unfit:
+            return f"{what}: {unfit}"
+    lengths = (("length_m", path.length_m), ("turning_radius_m", path.turning_radius_m))
+    return next((f"{name} {value}" for name, value in lengths if value < 0.0), "")
+
+
+def _unfit_kept(planner: Planner) -> str:
+    clearance_m = kept(planner, "clearance_m")
+    wrong = unfit_number(clearance_m) or ("" if clearance_m >= 0.0 else str(clearance_m))
+    return f"clearance_m {wrong}" if wrong else ""
+
+
 PLANNERS: Registry[Planner] = Registry(
     "planner",
     "pilotage.stack.planning",
-    gives=(Gives("plan", "a PlanResult with a path to drive", _unfit_plan),),
+    gives=(
+        keeps("a clearance_m of 0 or more", _unfit_kept),
+        Gives("plan", "a PlanResult with a path to drive", _unfit_plan),
+    ),
 )
 SMOOTHERS: Registry[Smoother] = Registry(
     "smoother", "pilotage.stack.planning", gives=(Gives("smooth", "a Path to drive", _unfit_smoothed),)

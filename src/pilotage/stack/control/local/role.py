@@ -6,8 +6,9 @@ import math
 from dataclasses import dataclass
 from typing import Protocol
 
-from pilotage.core.checked import Gives, misfit
+from pilotage.core.checked import Gives
 from pilotage.core.errors import InputError
+from pilotage.core.misfit import kept, misfit, told
 from pilotage.core.registry import Registry
 from pilotage.core.types import FloatArray, Pose2, Twist
 from pilotage.kernels.control.scan_ends import evenly_spaced
@@ -128,8 +129,13 @@ class LocalController(Protocol):
         ...
 
 
+def _unfit(given: object, controller: LocalController, *_: object) -> str:
+    status = kept(controller, "status")
+    return misfit(given, Twist) or ("" if isinstance(status, str) else f"status {told(status)}")
+
+
 LOCAL_CONTROLLERS: Registry[LocalController] = Registry(
     "local controller",
     "pilotage.stack.control.local",
-    gives=(Gives("step", "a Twist of finite numbers", lambda given, *_: misfit(given, Twist)),),
+    gives=(Gives("step", "a Twist of finite numbers, and a word as status", _unfit),),
 )
