@@ -6,6 +6,7 @@ import json
 import math
 import re
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path as FilePath
 from types import SimpleNamespace
 from typing import Any
@@ -16,6 +17,7 @@ import yaml
 
 from pilotage.core import plugins
 from pilotage.core.checked import Gives, checked
+from pilotage.core.config import validate
 from pilotage.core.errors import InputError
 from pilotage.core.types import Goal, Pose2, Twist
 from pilotage.evaluation.finished import Verdict
@@ -24,6 +26,7 @@ from pilotage.evaluation.metrics.registry import Metrics
 from pilotage.evaluation.tasks.task import TASKS
 from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.segment_map import SegmentMap
+from pilotage.models.motion.motion import MotionConfig
 from pilotage.sensors.readings import GpsFix, LidarScan
 from pilotage.sim.bodies.motion import SIMULATED_MOTIONS
 from pilotage.sim.faults.fault import FAULTS
@@ -313,6 +316,26 @@ def test_what_a_component_keeps_is_looked_at_with_what_it_gives() -> None:
         setattr(method.__self__, name, value)
         with pytest.raises(InputError, match=f"{role} 'mine' of 'somebodys': .*: expected"):
             method(*CALLED_WITH.get(role, ()))
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "told"),
+    [
+        ("top_speed_m_s", None, "expected top_speed_m_s above 0, found none"),
+        ("top_speed_m_s", math.inf, "expected top_speed_m_s above 0, found inf"),
+        ("top_turn_rate_rad_s", 0.0, "expected top_turn_rate_rad_s above 0, found 0.0"),
+        ("braking_m_s2", NAN, "expected braking_m_s2 above 0, found nan"),
+        ("least_turning_radius_m", -1.0, "expected least_turning_radius_m from 0 to 1e+30, found -1.0"),
+        ("curvature_rate_per_m_s", 10**400, "expected curvature_rate_per_m_s above 0, found int 1000"),
+    ],
+)
+def test_a_data_sheet_without_limits_is_refused(name: str, value: object, told: str) -> None:
+    """It drove by what is no number, or ended in a division by zero of ours."""
+    limits = {"top_speed_m_s": 1.0, "top_turn_rate_rad_s": 1.0, name: value}
+    members = {key: property(partial(lambda limit, _: limit, limit)) for key, limit in limits.items()}
+    sheet = type("Sheet", (MotionConfig,), {"__module__": "somebodys", **members})
+    with pytest.raises(InputError, match=re.escape(f"robot.motion: {told}")):
+        validate(sheet, {}, "robot.motion")
 
 
 class TakesOne:

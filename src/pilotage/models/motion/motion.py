@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated
+from typing import Annotated, Any, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from pilotage.core.config import Config
+from pilotage.core.misfit import LARGEST, unfit_number
 from pilotage.core.registry import Registry
 
 Positive = Annotated[float, Field(gt=0.0)]
+_ABOVE_ZERO = (
+    ("top_speed_m_s", False),
+    ("top_turn_rate_rad_s", False),
+    ("curvature_rate_per_m_s", True),
+    ("braking_m_s2", True),
+    ("turn_acceleration_rad_s2", True),
+)
+"""Limits that are above 0, and whether they may be infinite."""
 
 
 class MotionConfig(Config):
@@ -22,6 +31,20 @@ class MotionConfig(Config):
 
     delay_s: float = Field(default=0.0, ge=0.0, le=2.0)
     """From a command until the robot follows it: a multiple of the run's time step."""
+
+    @model_validator(mode="after")
+    def _limits_are_limits(self) -> Self:
+        """Who plans and brakes divides by them; those of a motion from outside may be anything."""
+        for name, may_be_infinite in _ABOVE_ZERO:
+            value = getattr(self, name)
+            wrong = unfit_number(value, unlimited=may_be_infinite) or ("" if value > 0.0 else str(value))
+            if wrong:
+                raise ValueError(f"expected {name} above 0, found {wrong}")
+        radius_m: Any = self.least_turning_radius_m
+        wrong = unfit_number(radius_m) or ("" if radius_m >= 0.0 else str(radius_m))
+        if wrong:
+            raise ValueError(f"expected least_turning_radius_m from 0 to {LARGEST:g}, found {wrong}")
+        return self
 
     @property
     def top_speed_m_s(self) -> float:
