@@ -157,6 +157,29 @@ def test_a_plugin_leaves_no_compiled_copy_beside_it(tmp_path: Path, monkeypatch:
     assert [path.name for path in tmp_path.iterdir()] == ["mine.py"]
 
 
+@pytest.mark.usefixtures("alone")
+def test_one_file_by_several_paths_is_one_plugin(tmp_path: Path) -> None:
+    """An attribution of a mission that named it by ``..`` called its names registered already."""
+    (tmp_path / "deep").mkdir()
+    (tmp_path / "mine.py").write_text("x = 1\n")
+    (tmp_path / "link.py").symlink_to("mine.py")
+    paths = [str(tmp_path / path) for path in ("mine.py", "deep/../mine.py", "link.py")]
+    plugins.add_plugins(paths)
+    assert plugins.named_plugins() == paths[:1]
+    assert [path for path in plugins._loaded if path.startswith(str(tmp_path))] == paths[:1]
+
+
+@pytest.mark.usefixtures("alone")
+def test_a_plugins_folder_may_be_called_anything(tmp_path: Path) -> None:
+    """A colon parted its path in two, of which neither was a file."""
+    folder = tmp_path / "mine: a b"
+    folder.mkdir()
+    (folder / "mine.py").write_text("x = 1\n")
+    plugins.add_plugins([str(folder / "mine.py")])
+    assert plugins.named_plugins() == [str(folder / "mine.py")]
+    plugins.load_plugins()
+
+
 BUGGY = """
 from pilotage.core.config import Config
 from pilotage.stack.planning.planner import PLANNERS

@@ -24,7 +24,7 @@ from pilotage.core.shown import shown
 GROUP = "pilotage.plugins"
 """Entry points of this group are imported when a component is first looked for."""
 VARIABLE = "PILOTAGE_PLUGINS"
-"""Files named here are loaded too, so that worker processes know what their parent was told."""
+"""Files named here, one a line, are loaded too: so worker processes know what their parent was told."""
 
 _loaded: dict[str, str] = {}
 _packages: dict[str, str] = {}
@@ -55,14 +55,14 @@ def add_plugins(files: Iterable[str]) -> None:
             continue
         path = str(Path(file).absolute())
         load_file(path)
-        if path not in named:
+        if not _is_among(path, named):
             named.append(path)
-    os.environ[VARIABLE] = os.pathsep.join(named)
+    os.environ[VARIABLE] = "\n".join(named)
 
 
 def named_plugins() -> list[str]:
     """The plugin files of this process, absolute."""
-    return [name for name in os.environ.get(VARIABLE, "").split(os.pathsep) if name]
+    return [name for name in os.environ.get(VARIABLE, "").splitlines() if name]
 
 
 def is_package(name: str) -> bool:
@@ -106,7 +106,7 @@ class _Unwritten(SourceFileLoader):
 
 
 def load_file(path: str) -> None:
-    """Import one plugin file, once a process.
+    """Import one plugin file, once a process, in whatever words its path is told.
 
     Raises
     ------
@@ -118,6 +118,8 @@ def load_file(path: str) -> None:
     if not Path(path).is_file() or Path(path).suffix != ".py":
         beside = hint_beside(Path(path), {".py"})
         raise InputError(f"plugin '{path}': expected a Python file, found none there{beside}")
+    if _is_among(path, _loaded):
+        return
     name = f"pilotage_plugin_{len(_loaded)}_{Path(path).stem}"
     spec = importlib.util.spec_from_file_location(name, path, loader=_Unwritten(name, path))
     if spec is None or spec.loader is None:
@@ -135,6 +137,11 @@ def load_file(path: str) -> None:
         del _loaded[path], sys.modules[name]
         told = str(error) if isinstance(error, InputError) else _where(error, path)
         raise InputError(f"plugin '{path}': {told}") from None
+
+
+def _is_among(path: str, paths: Iterable[str]) -> bool:
+    """Whether a file is one of those: by ``..`` and links one file has many paths."""
+    return os.path.realpath(path) in map(os.path.realpath, paths)
 
 
 @dataclass(frozen=True, slots=True)
