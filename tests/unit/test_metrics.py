@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +15,7 @@ from hypothesis.extra.numpy import arrays
 from pilotage.core.errors import InputError
 from pilotage.evaluation.consistency import nis_metrics
 from pilotage.evaluation.metric import UNITS, Aspect, Clock, Direction, Metric, words_and_unit
-from pilotage.evaluation.metrics import METRICS
+from pilotage.evaluation.metrics import METRICS, computed
 from pilotage.evaluation.metrics.registry import Metrics
 from pilotage.evaluation.metrics.table import DECISIVE, shipped_metrics
 from pilotage.evaluation.pose_errors import pose_errors
@@ -59,6 +61,31 @@ def test_a_plugin_declares_a_metric_and_a_task() -> None:
     ]
     assert "rounds" not in metrics.given_by("reach")
     assert "rounds" not in METRICS
+
+
+def test_a_team_has_its_worst_robots_number_and_each_robot_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a plugin computes was the first robot's alone, told as the team's."""
+    metrics = Metrics([], {})
+    for key, direction in (("less", Direction.LESS), ("more", Direction.MORE), ("even", Direction.NONE)):
+        metrics.computed_by(Metric(key, key, "", "", direction))(lambda trace, _: float(trace["t_s"][-1]))
+    metrics.computed_by(Metric("hit", "hit", "", ""))(lambda _, known: float(known["hits"] + known["seed"]))
+    monkeypatch.setattr(computed, "METRICS", metrics)
+    robots = [
+        SimpleNamespace(name=name, trace={"t_s": np.array([t])}) for name, t in (("a", 1.0), ("b", 4.0))
+    ]
+    run: Any = SimpleNamespace(mission=SimpleNamespace(task=SimpleNamespace(name="reach")), robots=robots)
+    known: dict[str, Any] = {"hits": 3, "seed": 5, "robots": {"a": {"hits": 1}, "b": {"hits": 2}}}
+    computed.add_computed(known, run)
+    assert {key: known[key] for key in ("less", "more", "even", "hit")} == {
+        "less": 4.0,
+        "more": 1.0,
+        "even": 2.5,
+        "hit": 6.5,
+    }
+    assert known["robots"] == {
+        "a": {"hits": 1, "less": 1.0, "more": 1.0, "even": 1.0, "hit": 6.0},
+        "b": {"hits": 2, "less": 4.0, "more": 4.0, "even": 4.0, "hit": 7.0},
+    }
 
 
 @pytest.mark.parametrize(

@@ -6,9 +6,8 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from pilotage.core.types import FloatArray
 from pilotage.evaluation.finished import Verdict
-from pilotage.evaluation.metrics import METRICS
+from pilotage.evaluation.metrics.computed import add_computed
 from pilotage.experiments.build.build import Experiment, build
 from pilotage.experiments.leavings import files_of
 from pilotage.experiments.loop import Run, run_loop
@@ -71,8 +70,6 @@ def run_mission(
 def judge(experiment: Experiment, run: Run) -> Verdict:
     """The task's verdict, with the metrics that were registered from outside."""
     verdict = experiment.task.judge(run.finished)
-    trace: dict[str, FloatArray] = run.finished.robots[0].trace
-    name = run.finished.mission.task.name
     verdict.metrics["success"] = bool(verdict.metrics["success"])
-    verdict.metrics.update(METRICS.computed(name, trace, verdict.metrics))
+    add_computed(verdict.metrics, run.finished)
     return verdict
