@@ -68,7 +68,8 @@ def test_a_team_has_its_worst_robots_number_and_each_robot_its_own(monkeypatch: 
     metrics = Metrics([], {})
     for key, direction in (("less", Direction.LESS), ("more", Direction.MORE), ("even", Direction.NONE)):
         metrics.computed_by(Metric(key, key, "", "", direction))(lambda trace, _: float(trace["t_s"][-1]))
-    metrics.computed_by(Metric("hit", "hit", "", ""))(lambda _, known: float(known["hits"] + known["seed"]))
+    hit: Any = lambda _, known: float(known["hits"] + known["seed"])  # noqa: E731
+    metrics.computed_by(Metric("hit", "hit", "", ""))(hit)
     monkeypatch.setattr(computed, "METRICS", metrics)
     robots = [
         SimpleNamespace(name=name, trace={"t_s": np.array([t])}) for name, t in (("a", 1.0), ("b", 4.0))

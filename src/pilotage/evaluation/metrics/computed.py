@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from pilotage.core.types import FloatArray
 from pilotage.evaluation.finished import FinishedRun
 from pilotage.evaluation.metric import Direction
 from pilotage.evaluation.metrics import METRICS
 
-_OF_TEAM = {Direction.LESS: np.max, Direction.MORE: np.min, Direction.NONE: np.mean}
+_OF_TEAM: Mapping[Direction, Callable[[FloatArray], float]] = {
+    Direction.LESS: np.max,
+    Direction.MORE: np.min,
+    Direction.NONE: np.mean,
+}
 """A team's number from its robots': that of the worst, the mean where neither way is better."""
 
 
@@ -35,4 +40,5 @@ def add_computed(metrics: dict[str, object], run: FinishedRun) -> None:
         for key, value in found.items():
             of_each.setdefault(key, []).append(value)
     for key, values in of_each.items():
-        metrics[key] = float(_OF_TEAM[METRICS.find(key).direction](np.array(values, dtype=np.float64)))
+        of_team = _OF_TEAM[METRICS.find(key).direction]
+        metrics[key] = float(of_team(np.array(values, dtype=np.float64)))
