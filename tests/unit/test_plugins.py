@@ -245,6 +245,14 @@ class MyController:
 """
 
 
+SPEAKS = BAD_LOCALIZER.replace("self.belief = initial", "self.belief = initial; journal.{says}").replace(
+    "{gives}", "self.belief"
+)
+THROUGH = SPEAKS.replace("journal.{says}", "Path.through([(1.0, 1.0)])").replace(
+    "import sys", "from pilotage.stack.planning.planner import Path"
+)
+
+
 @pytest.mark.usefixtures("alone")
 @pytest.mark.parametrize(
     ("role", "text", "told"),
@@ -258,6 +266,15 @@ class MyController:
         ("localizer", BAD_LOCALIZER.format(gives="(_ for _ in ()).throw(GeneratorExit)"), ": GeneratorExit"),
         ("localizer", BAD_LOCALIZER.format(gives="open('/none/x')"), "line 16: FileNotFoundError: "),
         ("controller", BAD_CONTROLLER, ": step: expected a Control of finite numbers, found Twist("),
+        (
+            "localizer",
+            SPEAKS.format(says="say(float('nan'), 'here', 'no')"),
+            "ValueError: event: expected a fi",
+        ),
+        ("localizer", SPEAKS.format(says="say(1.0, 'here', None)"), "found 1.0, 'here', None"),
+        ("localizer", SPEAKS.format(says="channel({3: 'm'})"), "found 3: 'm'"),
+        ("localizer", SPEAKS.format(says="channel({'t_s': 's'})"), "found 't_s', which it has already"),
+        ("localizer", THROUGH, "path: expected two corners or more that lie apart, found 1 (plugin '"),
     ],
 )
 def test_a_plugin_that_gives_something_else_is_named(
@@ -280,5 +297,5 @@ def test_a_plugin_that_gives_something_else_is_named(
     assert answer.out == ""
     last = answer.err.splitlines()[-1]
     assert told in last
-    assert "'mine'" in last or str(file) in last
+    assert "'mine'" in last or str(file) in last or "'t_s'" in last
     assert not (tmp_path / "runs").exists()

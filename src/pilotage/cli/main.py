@@ -131,7 +131,7 @@ def _steady_environment() -> None:
 def _run(arguments: list[str], struck: list[KeyboardInterrupt]) -> int:
     from pilotage.cli.app import dispatch
     from pilotage.core.errors import InputError
-    from pilotage.core.plugins import consequence_of, fault_of, take_nothing
+    from pilotage.core.plugins import consequence_of, fault_of, refusal_of, take_nothing
 
     take_nothing()
     try:
@@ -146,7 +146,7 @@ def _run(arguments: list[str], struck: list[KeyboardInterrupt]) -> int:
         if stopped is not None:
             raise stopped from None
         if isinstance(error, InputError):
-            return _say(str(error), BAD_INPUT)
+            return _say(refusal_of(error), BAD_INPUT)
         fault = fault_of(error)
         if fault is not None:
             print(fault.traceback, file=sys.stderr)

@@ -154,18 +154,34 @@ class Fault:
 
 def fault_of(error: BaseException) -> Fault | None:
     """Tell whether an error came out of a plugin's code, or of ours as a plugin called it; None: neither."""
-    frames = traceback.extract_tb(error.__traceback__)
-    homes = _homes()
-    own = [frame for frame in frames if _home_of(frame.filename, homes) is not None]
+    own = _own_frames(error)
     if not own:
         return None
-    last = own[-1]
-    home = _home_of(last.filename, homes)
-    assert home is not None, "only such frames are kept"
-    place = f"line {last.lineno}" if last.filename == home else f"{last.filename} line {last.lineno}"
     told = "".join(traceback.format_exception_only(error)).strip()
     text = "Traceback of the plugin (most recent call last):\n" + "".join(traceback.format_list(own)) + told
-    return Fault(f"plugin {homes[home]} {place}: {_named(error)}", text)
+    return Fault(f"{_place(own[-1])}: {_named(error)}", text)
+
+
+def refusal_of(error: InputError) -> str:
+    """What an error says, and where in a plugin what it refuses was asked for."""
+    own = _own_frames(error)
+    return f"{error} ({_place(own[-1])})" if own else str(error)
+
+
+def _own_frames(error: BaseException) -> list[traceback.FrameSummary]:
+    """Those of an error's traceback that are a plugin's code."""
+    homes = _homes()
+    frames = traceback.extract_tb(error.__traceback__)
+    return [frame for frame in frames if _home_of(frame.filename, homes) is not None]
+
+
+def _place(frame: traceback.FrameSummary) -> str:
+    """Plugin and line of a frame of its code."""
+    homes = _homes()
+    home = _home_of(frame.filename, homes)
+    assert home is not None, "only such frames are asked about"
+    line = f"line {frame.lineno}"
+    return f"plugin {homes[home]} {line if frame.filename == home else f'{frame.filename} {line}'}"
 
 
 def take(module: str) -> None:

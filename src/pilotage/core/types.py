@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import numbers
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -118,3 +119,16 @@ class Event:
     t_s: float
     kind: str
     text: str
+
+    def __post_init__(self) -> None:
+        """Refuse what no record can hold, where it is told: a folder would be written that nobody reads.
+
+        Raises
+        ------
+        ValueError
+            For a time that is no finite number, and words that are no text.
+        """
+        texts = isinstance(self.kind, str) and isinstance(self.text, str)
+        if not texts or not isinstance(self.t_s, numbers.Real) or not math.isfinite(self.t_s):
+            found = f"{self.t_s!r}, {self.kind!r}, {self.text!r}"
+            raise ValueError(f"event: expected a finite time, a kind and a text, found {found}")

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import math
 from array import array
+from collections import Counter
 
 import numpy as np
 
+from pilotage.core.errors import InputError
 from pilotage.core.types import Command, FloatArray, Twist, WheelSpeeds
 from pilotage.evaluation.tasks.task import Task
 from pilotage.experiments.build.team import Member
 from pilotage.experiments.odometry_since import OdometrySince
 from pilotage.models.motion.omnidirectional import OmnidirectionalConfig
 from pilotage.models.motion.wheel_drive import WheelDriveConfig
+from pilotage.records.trace import ROBOT_COLUMN
 from pilotage.sensors.readings import OdometryIncrement, Readings, UltrasonicReading
 from pilotage.sensors.ultrasonic import UltrasonicConfig
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
@@ -45,6 +48,11 @@ class Recorder:
 
     Where rows are ``thinned`` the steps between two of them are passed over, and a row tells the odometry of
     all of them.
+
+    Raises
+    ------
+    InputError
+        Where the task or a component's telemetry has a column of a name that the trace has already.
     """
 
     def __init__(self, member: Member, body: Body, task: Task, index: int, thinned: bool) -> None:
@@ -72,6 +80,12 @@ class Recorder:
             *task.columns,
             *member.journal.units,
         )
+        twice = [name for name, count in Counter((ROBOT_COLUMN, *self.names)).items() if count > 1]
+        if twice:
+            raise InputError(
+                f"the trace: expected new names of the task's columns and the components' telemetry, found "
+                f"'{twice[0]}', which it has already"
+            )
 
     def pass_over(self, readings: Readings) -> None:
         """Take note of a step that gets no row."""

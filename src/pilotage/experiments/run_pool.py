@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 from pilotage.core.errors import InputError
 from pilotage.core.memory import look_seldom
-from pilotage.core.plugins import fault_of
+from pilotage.core.plugins import fault_of, refusal_of
 from pilotage.experiments import worker_processes
 from pilotage.experiments.worker_processes import interrupts_held, obey_the_parent
 
@@ -61,10 +61,10 @@ def blamed(work: Callable[..., R], *job: Any) -> R:
     try:
         return work(*job)
     except BaseException as error:
-        fault = None if isinstance(error, InputError) else fault_of(error)
+        fault = fault_of(error)
         if fault is None:
             raise
-        raise InputError(fault.line) from None
+        raise InputError(refusal_of(error) if isinstance(error, InputError) else fault.line) from None
 
 
 def _begin() -> None:

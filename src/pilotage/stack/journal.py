@@ -95,9 +95,11 @@ class Journal:
         Raises
         ------
         ValueError
-            If a name is declared twice.
+            If a name is declared twice; where names or units are no texts.
         """
-        for name in columns:
+        for name, unit in columns.items():
+            if not isinstance(name, str) or not isinstance(unit, str):
+                raise ValueError(f"telemetry: expected names and units as texts, found {name!r}: {unit!r}")
             if name in self.units:
                 raise ValueError(f"telemetry: the column '{name}' is declared twice")
         untold = array("d", [float("nan")] * len(columns))

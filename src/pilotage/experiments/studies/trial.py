@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from pilotage.core.errors import InputError
-from pilotage.core.plugins import fault_of
+from pilotage.core.plugins import fault_of, refusal_of
 from pilotage.evaluation.metrics import METRICS
 from pilotage.experiments.mission import mission_of
 from pilotage.experiments.run import run_mission
@@ -72,7 +72,7 @@ class TrialRunner:
         try:
             return measured(task.row, self.mission(task.overrides, task.seed))
         except InputError as error:
-            return Outcome(task.row, {}, {}, str(error))
+            return Outcome(task.row, {}, {}, refusal_of(error))
         except BaseException as error:  # what goes wrong in one trial is that trial's, not the study's
             if not isinstance(error, Exception) and fault_of(error) is None:
                 raise
