@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -201,6 +201,23 @@ def test_each_heading_filter_can_be_chosen() -> None:
     assert turned_by(GyroBiasFilter(GyroBiasConfig(), at_start)) < 0.5 * by_default
     compass = EncoderMagnetometerFilter(EncoderMagnetometerConfig(), at_start)
     assert turned_by(compass, magnetometer=True) < 0.5 * encoders
+
+
+def test_a_heading_filter_may_use_the_encoders_alone() -> None:
+    """It was told to need a magnetometer, which it makes no use of."""
+
+    class ByWheels:
+        USES: ClassVar[frozenset[str]] = frozenset()
+        estimate = HeadingEstimate(START.theta_rad, 0.01)
+
+        def step(self, turn: float | None, *_: object) -> HeadingEstimate:
+            heading = wrap_to_pi(self.estimate.heading_rad + (turn or 0.0))
+            self.estimate = HeadingEstimate(heading, 0.01)
+            return self.estimate
+
+    filtered: Any = ByWheels()
+    found, truth = drive(WheelPose(sheet_knowledge(), filtered), WheelSpeeds(2.0, 2.4), 5.0)
+    assert abs(wrap_to_pi(found.theta_rad - truth.theta_rad)) < 0.05
 
 
 def test_a_heading_filter_that_would_never_be_asked_is_refused() -> None:

@@ -56,7 +56,7 @@ class WheelPose:
             raise InputError(
                 "stack.heading: expected stack.navigator.fusion on, found it off: no filter runs"
             )
-        if chosen is not None and "gyroscope" not in chosen.USES and not knowledge.magnetometer:
+        if chosen is not None and not knowledge.magnetometer and set(chosen.USES) == {"magnetometer"}:
             raise InputError("stack.heading: this filter needs stack.navigator.magnetometer on, found it off")
         at_start = HeadingEstimate(knowledge.start.theta_rad, START_VAR_RAD2)
         self._heading = chosen or EncoderGyroFilter(EncoderGyroConfig(errors=HeadingErrors()), at_start)
