@@ -15,6 +15,9 @@ from scipy.io import savemat
 from pilotage.cli.localize import localize
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
+from pilotage.evaluation.metric import Metric
+from pilotage.evaluation.metrics.registry import Metrics
+from pilotage.experiments.recordings import localize as localize_module
 from pilotage.experiments.recordings.localize import localize_log
 from pilotage.kernels.filters import gauss_markov
 from pilotage.logs.aer1513 import read_aer1513
@@ -133,6 +136,18 @@ def test_the_command_prints_plain_numbers_and_names_its_page(
     assert not set("[]{}") & set(printed)
     assert printed.splitlines()[-1].startswith("report ")
     assert Path(printed.split()[-1]).is_file()
+
+
+def test_metrics_of_ones_own_are_computed_of_recordings_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A plugin's were computed in simulation alone."""
+    savemat(tmp_path / "d.mat", laser_drive())
+    metrics = Metrics([], {})
+    metrics.computed_by(Metric("east_m", "east", "m", ""))(lambda trace, _: float(trace["est_x_m"].max()))
+    monkeypatch.setattr(localize_module, "METRICS", metrics)
+    found = localize_log(tmp_path / "d.mat", tmp_path / "runs", localizer="dead-reckoning")
+    assert np.isfinite(np.float64(str(found.metrics["east_m"])))
 
 
 def test_a_recording_s_page_shows_what_recordings_have(tmp_path: Path) -> None:

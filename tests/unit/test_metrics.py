@@ -63,6 +63,18 @@ def test_a_plugin_declares_a_metric_and_a_task() -> None:
     assert "rounds" not in METRICS
 
 
+def test_a_run_without_the_columns_of_a_metric_does_without_it() -> None:
+    """It ended the run with a plugin's KeyError; one for anything else still does."""
+    metrics = Metrics([], {})
+    metrics.computed_by(Metric("far", "far", "", ""))(lambda trace, _: float(trace["us_front_m"].max()))
+    assert metrics.computed("reach", {"t_s": np.zeros(2)}, {}) == {}
+    assert metrics.computed("reach", {"us_front_m": np.arange(3.0)}, {}) == {"far": 2.0}
+    wrong: Any = lambda _, known: known["nothing"]  # noqa: E731
+    metrics.computed_by(Metric("wrong", "wrong", "", ""))(wrong)
+    with pytest.raises(KeyError, match="nothing"):
+        metrics.computed("reach", {}, {})
+
+
 def test_a_team_has_its_worst_robots_number_and_each_robot_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
     """What a plugin computes was the first robot's alone, told as the team's."""
     metrics = Metrics([], {})

@@ -102,7 +102,8 @@ class Metrics:
     def computed(
         self, task: str, trace: Mapping[str, FloatArray], metrics: Mapping[str, object]
     ) -> dict[str, object]:
-        """What the declared functions give for a run; what gives None is left out.
+        """What the declared functions give for a run; left out what gives None, or asks for a column that the
+        run has not.
 
         Raises
         ------
@@ -114,7 +115,10 @@ class Metrics:
         for metric in self:
             if metric.compute is None or not metric.is_given_by(task):
                 continue
-            value = metric.compute(trace, metrics)
+            try:
+                value = metric.compute(trace, metrics)
+            except NoColumnError:
+                continue
             if value is None:
                 continue
             if unfit_number(value):
@@ -126,9 +130,18 @@ class Metrics:
         return found
 
 
+class NoColumnError(KeyError):
+    """A run's trace has no such column."""
+
+
+class _Columns(dict[str, FloatArray]):
+    def __missing__(self, name: str) -> FloatArray:
+        raise NoColumnError(name)
+
+
 def _to_look_at(trace: Mapping[str, FloatArray]) -> Mapping[str, FloatArray]:
     """Columns that whoever is handed them cannot write into: they are the run's record."""
-    views = {name: column.view() for name, column in trace.items()}
+    views = _Columns((name, column.view()) for name, column in trace.items())
     for view in views.values():
         view.flags.writeable = False
     return MappingProxyType(views)

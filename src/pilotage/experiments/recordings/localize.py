@@ -14,6 +14,7 @@ import yaml
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray
 from pilotage.evaluation.log_metrics import log_metrics
+from pilotage.evaluation.metrics import METRICS
 from pilotage.experiments.leavings import drawn_grid, drawn_walls
 from pilotage.experiments.recordings.drive import LIDAR, RecordedDrive
 from pilotage.experiments.recordings.follow import Followed, bounds_of, build_localizer, follow
@@ -95,6 +96,7 @@ def localize_log(
         "misread_barcodes": len(drive.misread),
         "stale_odometry_rows": len(drive.stale),
     }
+    metrics |= METRICS.computed("localize", trace, metrics)
     return _write(out, drive, metrics, followed, {"name": localizer, **config.model_dump(mode="json")})
 
 
