@@ -12,6 +12,7 @@ import yaml
 
 from pilotage.cli.main import main
 from pilotage.core import plugins
+from pilotage.core.errors import InputError
 from support.missions import reach
 from support.warm_commands import pilotage
 
@@ -102,6 +103,9 @@ class Planner:
         "Nothing."
 PLANNERS.add({name}, {config})({what})
 """
+NAMED = REGISTERS.format(name="'mine'", config="Mine", what="Planner").replace(
+    '"Nothing."', "name: str = 'x'", 1
+)
 MUTE = "class Mute(Exception):\n    def __str__(self):\n        return 1 / 0\n"
 TAKEN_METRIC = """
 from pilotage.evaluation.metric import Metric
@@ -127,6 +131,15 @@ METRICS.add(Metric("duration_s", "mine", "s", ""))
         (REGISTERS.format(name="'mine'", config="{}", what="Planner"), "derives from Config, found dict {}"),
         (REGISTERS.format(name="''", config="Mine", what="Planner"), "expected a name, a text that is not"),
         (REGISTERS.format(name="3", config="Mine", what="Planner"), "expected a name, a text that is not"),
+        (REGISTERS.format(name="' mine'", config="Mine", what="Planner"), "a name without spaces around it"),
+        (
+            REGISTERS.format(name="'mi\\nne'", config="Mine", what="Planner"),
+            "'mi\\nne': expected a name without",
+        ),
+        (
+            NAMED.format(name="'mine'", config="Mine", what="Planner"),
+            "planner 'mine': expected parameters of any other name, found 'name'",
+        ),
         (TAKEN, "planner 'astar': expected a new name, found it registered already"),
         (TAKEN_METRIC, "metric 'duration_s': expected a new key, found it declared already"),
         (None, "expected a Python file, found none there"),
@@ -155,6 +168,18 @@ def test_a_plugin_leaves_no_compiled_copy_beside_it(tmp_path: Path, monkeypatch:
     (tmp_path / "mine.py").write_text("x = 1\n")
     plugins.load_file(str(tmp_path / "mine.py"))
     assert [path.name for path in tmp_path.iterdir()] == ["mine.py"]
+
+
+@pytest.mark.usefixtures("alone")
+def test_a_plugin_that_looks_for_its_neighbour_is_told_how(tmp_path: Path) -> None:
+    """ "No module named 'helper'", which lay beside it."""
+    (tmp_path / "helper.py").write_text("x = 1\n")
+    (tmp_path / "parts").mkdir()
+    for name, said in (("helper", True), ("parts.one", True), ("nowhere", False)):
+        (tmp_path / "mine.py").write_text(f"import {name}\n")
+        with pytest.raises(InputError, match="line 1: ModuleNotFoundError") as refused:
+            plugins.load_file(str(tmp_path / "mine.py"))
+        assert ("lies beside it, but a plugin's folder is not looked in" in str(refused.value)) is said
 
 
 @pytest.mark.usefixtures("alone")

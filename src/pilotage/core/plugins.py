@@ -258,7 +258,19 @@ def _where(error: BaseException, path: str = "") -> str:
     lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == path]
     number = error.lineno if isinstance(error, SyntaxError) else (lines[-1] if lines else None)
     place = "" if number is None else f"line {number}: "
-    return f"{place}{_named(error)}"
+    return f"{place}{_named(error)}{_hint_of_neighbour(error, path)}"
+
+
+def _hint_of_neighbour(error: BaseException, path: str) -> str:
+    """Who looks for a module that lies beside the plugin is told how two files come together."""
+    name = error.name if path and isinstance(error, ModuleNotFoundError) and error.name else ""
+    beside = Path(path).parent / name.partition(".")[0]
+    if not name or not (beside.is_dir() or beside.with_suffix(".py").is_file()):
+        return ""
+    return (
+        f"; '{beside.name}' lies beside it, but a plugin's folder is not looked in: make a package of both "
+        "(entry points), or put the folder on PYTHONPATH"
+    )
 
 
 def _named(error: BaseException) -> str:

@@ -74,12 +74,21 @@ class Registry(Generic[T]):
         """What a plugin hands in may be anything."""
         if not isinstance(name, str) or not name.strip():
             raise InputError(f"{self.role}: expected a name, a text that is not empty, found {told(name)}")
+        if name != name.strip() or not name.isprintable():
+            raise InputError(
+                f"{self.role} {name!r}: expected a name without spaces around it and control characters"
+            )
         if not isinstance(cls, type):
             raise InputError(f"{self.role} '{name}': expected a class, found {told(cls)}")
         if not isinstance(config, type) or not issubclass(config, Config):
             found = config.__name__ if isinstance(config, type) else told(config)
             raise InputError(
                 f"{self.role} '{name}': expected a config, a class that derives from Config, found {found}"
+            )
+        if "name" in config.model_fields:
+            raise InputError(
+                f"{self.role} '{name}': expected parameters of any other name, found 'name', which tells the "
+                "component itself"
             )
 
     def add_config(self, name: str) -> Callable[[C], C]:
