@@ -41,6 +41,9 @@ from pilotage.stack.localization.heading_filter import HEADING_FILTERS, HeadingE
 from pilotage.stack.localization.localizer import LOCALIZERS
 from pilotage.stack.mapping.mapper import MAPPERS
 from pilotage.stack.patrol.strategy import STRATEGIES
+from pilotage.stack.planning.grid_path import GridPath
+from pilotage.stack.planning.grid_planner import GRID_PLANNERS, GridRequest, GridResult
+from pilotage.stack.planning.grid_space import GridSpace
 from pilotage.stack.planning.local_planner import LOCAL_PLANNERS, LocalPath
 from pilotage.stack.planning.planner import PLANNERS, SMOOTHERS, Path, PlanRequest, PlanResult, PlanStatus
 from support.warm_commands import pilotage
@@ -82,6 +85,14 @@ class OwnReading:
     depth_m: float
 
 
+WALL = np.zeros((3, 5), dtype=np.bool_)
+WALL[:2, 2] = True
+
+
+def cells(*path: tuple[int, int]) -> GridResult:
+    return GridResult(PlanStatus.FOUND, "", GridPath(np.array(path), 1.0, 1.0, 1), 0.1)
+
+
 CORRELATED = np.array([[1.0, 2.0, 0.0], [2.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
 SKEW = np.array([[1.0, 0.5, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
 KNOWN = SimpleNamespace(own_idleness_s=np.zeros(4))
@@ -104,6 +115,7 @@ GIVES: dict[str, tuple[Any, str]] = {
     "words": (STRATEGIES, "words"),
     "row": (TASKS, "row"),
     "progress": (TASKS, "progress"),
+    "grid planner": (GRID_PLANNERS, "search"),
     "people": (PEOPLE, "step"),
     "fault": (FAULTS, "pass_on"),
 }
@@ -126,6 +138,7 @@ CALLED_WITH: dict[str, tuple[object, ...]] = {
     "motion": (Twist(0.1, 0.0),),
     "task": (SimpleNamespace(robots=[SimpleNamespace(trace={"t_s": np.zeros(3)})]),),
     "fault": (1.0, (GpsFix(1.0, 2.0),)),
+    "grid planner": (GridRequest(GridSpace(WALL), (0, 0), (0, 4)),),
 }
 
 
@@ -134,7 +147,7 @@ def made(role: str, gives: object, **members: object) -> Any:
     registry, method = GIVES[role]
     roles = registry._gives
     methods: dict[str, object] = {
-        each.method: lambda *_: gives for each in roles if each.method != "__init__"
+        each.method: lambda *_: gives for each in roles if each.method != "__init__" and not each.optional
     }
     keeps = KEEPS.get(registry.role, {})
     cls = type("Mine", (), {"__module__": "somebodys", **methods, **keeps, **members})
@@ -163,6 +176,8 @@ def made(role: str, gives: object, **members: object) -> Any:
         ("sensor", None),
         ("sensor", GpsFix(1.0, 2.0)),
         ("sensor", OwnReading(1.0)),
+        ("grid planner", cells((0, 0), (2, 0), (2, 4), (0, 4))),
+        ("grid planner", GridResult(PlanStatus.NO_PATH, "", None, 0.1)),
         ("mapper", False),
         ("words", np.zeros(0)),
         ("row", (NAN,)),
@@ -245,6 +260,15 @@ def test_what_is_right_comes_through(role: str, gives: object) -> None:
         ("people", [[1.0, 2.0]], "found list [[1.0, 2.0]]"),
         ("people", np.zeros((2, 2)), "an array (2, 2) of 1 people"),
         ("people", np.full((1, 2), math.inf), "inf in an array (1, 2)"),
+        ("grid planner", None, "found none"),
+        ("grid planner", GridResult(PlanStatus.FOUND, "", None, 0.1), "found none that is found"),
+        (
+            "grid planner",
+            cells((0, 0), (2, 0)),
+            "a path whose goal is the cell (2, 0) where (0, 4) was asked for",
+        ),
+        ("grid planner", cells((0, 0), (0, 2), (0, 4)), "a path over the cell (0, 2), which is not free"),
+        ("grid planner", cells((0, 0), (0, 4)), "a path from the cell (0, 0) to (0, 4) through what is not"),
         ("fault", None, "found none"),
         ("fault", (GpsFix(NAN, 0.0),), "GpsFix with x_m nan"),
         ("fault", (1.0,), "found float 1.0"),
@@ -360,6 +384,14 @@ def test_one_that_cannot_be_built_as_its_role_says_is_refused(base: type, found:
     told = f"^controller 'mine' of 'somebodys': expected to be built from 2 arguments .*{re.escape(found)}"
     with pytest.raises(InputError, match=told):
         cls(1, 2)
+
+
+def test_a_planner_is_looked_at_over_cells_as_well() -> None:
+    """Navigator curve drove a path that began elsewhere."""
+    planner = made("planner", None, search=lambda *_: cells((1, 1), (0, 4))).__self__
+    with pytest.raises(InputError, match=r"planner 'mine' .*: search: expected .* whose start is the cell"):
+        planner.search(*CALLED_WITH["grid planner"])
+    assert not hasattr(made("planner", None).__self__, "search")
 
 
 def test_one_without_a_constructor_is_built_from_nothing() -> None:

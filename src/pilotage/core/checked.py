@@ -30,11 +30,14 @@ class Gives:
     wrong
         From what it gave, the component, and what it was called with: what is wrong with it, in words; empty
         where nothing is.
+    optional
+        Whether a component may be without the method.
     """
 
     method: str
     expected: str
     wrong: Callable[..., str]
+    optional: bool = False
 
 
 def keeps(expected: str, wrong: Callable[[Any], str]) -> Gives:
@@ -63,7 +66,11 @@ def checked(cls: C, whose: str, *roles: Gives) -> C:
         return cls
     whose = f"{whose} of {giver(cls.__module__)}"
     looks = {gives.method: gives for gives in (_ANYTHING, *roles)}
-    methods = {method: _looked_at(cls, whose, gives) for method, gives in looks.items()}
+    methods = {
+        method: _looked_at(cls, whose, gives)
+        for method, gives in looks.items()
+        if not gives.optional or hasattr(cls, method)
+    }
     return type(cls)(cls.__name__, (cls,), {"__module__": cls.__module__, "__doc__": cls.__doc__, **methods})
 
 

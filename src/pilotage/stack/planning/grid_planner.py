@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Protocol
 
+from pilotage.core.checked import Gives
+from pilotage.core.misfit import misfit
 from pilotage.core.registry import Registry
 from pilotage.stack.planning.grid_space import Cell, GridPath, GridSpace
 from pilotage.stack.planning.planner import PlanStatus
@@ -41,4 +44,32 @@ class GridPlanner(Protocol):
         ...
 
 
-GRID_PLANNERS: Registry[GridPlanner] = Registry("grid planner", "pilotage.stack.planning")
+def unfit_cells(given: object, _: object, request: object) -> str:
+    """Why an answer to a ``GridRequest`` is none: its types, its path's ends, cells that are not free."""
+    wrong = misfit(given, GridResult)
+    if wrong or not isinstance(given, GridResult) or not isinstance(request, GridRequest):
+        return wrong
+    if given.path is None:
+        return "none that is found" if given.status is PlanStatus.FOUND else ""
+    cells = given.path.cells
+    if cells.ndim != 2 or cells.shape[1] != 2 or not len(cells):
+        return f"cells, an array {cells.shape} instead of (N, 2)"
+    path = [(int(row), int(column)) for row, column in cells.tolist()]
+    for what, asked, end in (("start", request.start, path[0]), ("goal", request.goal, path[-1])):
+        if asked != end:
+            return f"a path whose {what} is the cell {end} where {asked} was asked for"
+    space = request.space
+    blocked = next((cell for cell in path if not space.is_free(cell)), None)
+    if blocked is not None:
+        return f"a path over the cell {blocked}, which is not free"
+    for cell, after in pairwise(path):
+        if not space.sees(cell, after, cut_corners=True):
+            return f"a path from the cell {cell} to {after} through what is not free"
+    return ""
+
+
+GRID_PLANNERS: Registry[GridPlanner] = Registry(
+    "grid planner",
+    "pilotage.stack.planning",
+    gives=(Gives("search", "a GridResult with a path over free cells", unfit_cells),),
+)

@@ -154,7 +154,8 @@ class Planner(Protocol):
     the outline itself, or plans backwards, says so by a class attribute ``FOR_OUTLINE = True``. One that can
     do either has a method ``outline_clearance_m(footprint)``, and is told by ``PlanRequest.beside_outline``.
     One that takes seconds and more, beside which loading what is compiled takes nothing, says
-    ``TAKES_LONG = True``: no run is rehearsed with it.
+    ``TAKES_LONG = True``: no run is rehearsed with it. One over cells, as navigator ``curve`` asks for, has
+    ``search`` besides and is registered with ``GRID_PLANNERS``, too.
     """
 
     @property
@@ -242,6 +243,12 @@ def _unfit_arrays(path: Path) -> str:
     return next((f"{name} {value}" for name, value in lengths if value < 0.0), "")
 
 
+def _unfit_cells(given: object, planner: Planner, request: object) -> str:
+    from pilotage.stack.planning.grid_planner import unfit_cells  # where planners are known already
+
+    return unfit_cells(given, planner, request)
+
+
 def _unfit_kept(planner: Planner) -> str:
     clearance_m = kept(planner, "clearance_m")
     wrong = unfit_number(clearance_m) or ("" if clearance_m >= 0.0 else str(clearance_m))
@@ -254,6 +261,7 @@ PLANNERS: Registry[Planner] = Registry(
     gives=(
         keeps("a clearance_m of 0 or more", _unfit_kept),
         Gives("plan", "a PlanResult with a path to drive", _unfit_plan),
+        Gives("search", "a GridResult with a path over free cells", _unfit_cells, optional=True),
     ),
 )
 SMOOTHERS: Registry[Smoother] = Registry(
