@@ -193,3 +193,14 @@ def test_who_is_on_its_way_to_look_is_not_followed() -> None:
     looking.given_up(np.array([False, False, True]), np.zeros(3, dtype=np.bool_), [0.0], 100.0)
     for t_s, other in ((100.0, 2), (122.0, 6), (123.0, 8)):
         assert looking.next_stop(memory.knowledge(t_s), lambda _: np.array([8]), away_m, [other]) == -1
+
+
+def test_what_a_strategy_says_nobody_changes_afterwards() -> None:
+    """Mates were handed the very array: one that wrote into it changed what all others heard."""
+    memory, said = PatrolMemory(2, 0, 2, 0, 1.0), np.ones(2)
+    memory.update(0.0, words=said)
+    heard = memory.message(0.0).states[0].words
+    said[:] = 5.0
+    assert heard.tolist() == [1.0, 1.0]
+    with pytest.raises(ValueError, match="read-only"):
+        heard[0] = 7.0

@@ -289,6 +289,12 @@ THROUGH = SPEAKS.replace("journal.{says}", "Path.through([(1.0, 1.0)])").replace
         ),
         ("localizer", BAD_LOCALIZER.format(gives="sys.exit(0)"), "line 16: SystemExit: 0"),
         ("localizer", BAD_LOCALIZER.format(gives="(_ for _ in ()).throw(GeneratorExit)"), ": GeneratorExit"),
+        ("localizer", BAD_LOCALIZER.format(gives="(_ for _ in ()).throw(KeyboardInterrupt)"), ": Key"),
+        (
+            "localizer",
+            BAD_LOCALIZER.format(gives="readings.by_sensor.clear()"),
+            "line 16: AttributeError: 'mappi",
+        ),
         ("localizer", BAD_LOCALIZER.format(gives="open('/none/x')"), "line 16: FileNotFoundError: "),
         ("controller", BAD_CONTROLLER, ": step: expected a Control of finite numbers, found Twist("),
         (

@@ -138,16 +138,17 @@ def _run(arguments: list[str], struck: list[KeyboardInterrupt]) -> int:
         code = dispatch(arguments)
         sys.stdout.flush()
         return code
-    except (BrokenPipeError, KeyboardInterrupt):
+    except BrokenPipeError:
         raise
     except BaseException as error:
-        # C code may drop an interruption for an error of its own, which tells nothing of it.
-        stopped = interruption_in(error) or (struck[0] if struck else None)
-        if stopped is not None:
+        fault = fault_of(error)
+        # C code may drop an interruption for an error of its own, which tells nothing of it. One that no
+        # signal struck is a plugin's own.
+        stopped = struck[0] if struck else interruption_in(error)
+        if stopped is not None and (struck or fault is None):
             raise stopped from None
         if isinstance(error, InputError):
             return _say(refusal_of(error), BAD_INPUT)
-        fault = fault_of(error)
         if fault is not None:
             print(fault.traceback, file=sys.stderr)
             return _say(fault.line, BAD_INPUT)

@@ -155,7 +155,13 @@ def _empty() -> Mapping[str, Reading]:
 
 @dataclass(frozen=True, slots=True)
 class Readings:
-    """What arrived in one step: time and the sensors that fired, by their name in the mission."""
+    """What arrived in one step: time and the sensors that fired, by their name in the mission.
+
+    All of a robot's parts are told the same ones, and the record after them: none can take one away.
+    """
 
     t_s: float
     by_sensor: Mapping[str, Reading] = field(default_factory=_empty)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "by_sensor", MappingProxyType(self.by_sensor))

@@ -147,7 +147,7 @@ def _shares(
             sheet.motion.top_speed_m_s,
             sheet.streams.stream("strategy"),
             passages=passages,
-            starts_m=site.starts_m,
+            starts_m=site.starts_m.copy(),  # nobody's strategy has any business in another's setting
             turn_m=site.turn_m,
             talks=talks,
         )

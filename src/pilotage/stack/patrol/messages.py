@@ -194,7 +194,13 @@ class PatrolMemory:
         words: FloatArray | None = None,
         shut: ShutPaths | None = None,
     ) -> None:
-        """Something else about itself changed."""
+        """Something else about itself changed.
+
+        Every robot that hears of it is handed the same words: they are copied, for nobody to write into.
+        """
+        if words is not None:
+            words = words.copy()
+            words.flags.writeable = False
         self._tell(t_s, speed_m_s=speed_m_s, on_duty=on_duty, words=words, shut=shut)
 
     def receive(self, message: PatrolMessage) -> None:
