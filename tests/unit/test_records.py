@@ -20,6 +20,7 @@ from pilotage.core.types import Event, Pose2
 from pilotage.maps.cell_map import CellState
 from pilotage.maps.occupancy_grid import OccupancyGrid
 from pilotage.records.cells import SheetData
+from pilotage.records.events import read_events, write_events
 from pilotage.records.grid import read_grid_layer, write_grid
 from pilotage.records.metrics import read_metrics, write_metrics
 from pilotage.records.numbers import number
@@ -272,3 +273,15 @@ def test_a_damaged_file_is_told_and_the_rest_is_read(tmp_path: Path, name: str, 
     assert len(told) == 1
     assert name in told[0]
     assert "\n" not in told[0]
+
+
+def test_an_event_without_a_time_is_read_as_it_was_written(tmp_path: Path) -> None:
+    """It was written as NaN, which no reader of JSON takes: the folder was there and its report was not."""
+    events = [Event(math.nan, "begun", "sometime"), Event(np.float32(1.5), "seen", "something")]  # type: ignore[arg-type]
+    write_events(tmp_path, events)
+    first, second = read_events(tmp_path)
+    assert math.isnan(first.t_s)
+    assert (first.text, second.t_s, second.kind) == ("sometime", 1.5, "seen")
+    for t_s, kind in ((math.inf, "seen"), ("now", "seen"), (1.0, None)):
+        with pytest.raises(ValueError, match="event: expected a finite time, a kind and a text"):
+            Event(t_s, kind, "")  # type: ignore[arg-type]

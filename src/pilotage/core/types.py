@@ -126,9 +126,10 @@ class Event:
         Raises
         ------
         ValueError
-            For a time that is no finite number, and words that are no text.
+            For a time that is no number or infinite, and words that are no text. NaN is a time that a
+            record does not tell.
         """
         texts = isinstance(self.kind, str) and isinstance(self.text, str)
-        if not texts or not isinstance(self.t_s, numbers.Real) or not math.isfinite(self.t_s):
+        if not texts or not isinstance(self.t_s, numbers.Real) or math.isinf(self.t_s):
             found = f"{self.t_s!r}, {self.kind!r}, {self.text!r}"
             raise ValueError(f"event: expected a finite time, a kind and a text, found {found}")

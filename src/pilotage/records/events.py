@@ -21,8 +21,12 @@ LATEST_S = 2**31 - 1
 
 
 def write_events(folder: Path, events: Iterable[Event]) -> None:
-    """Write the events in their order."""
-    lines = [json.dumps({"t_s": e.t_s, "kind": e.kind, "text": e.text}) + "\n" for e in events]
+    """Write the events in their order; a time that is not known as null."""
+    lines = [
+        json.dumps({"t_s": None if math.isnan(e.t_s) else float(e.t_s), "kind": e.kind, "text": e.text})
+        + "\n"
+        for e in events
+    ]
     (folder / EVENTS_FILE).write_text("".join(lines), encoding="utf-8")
 
 

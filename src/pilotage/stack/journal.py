@@ -73,9 +73,17 @@ class Journal:
     _channels: list[Channel] = field(default_factory=list)
 
     def say(self, t_s: float, kind: str, text: str) -> None:
-        """Tell that something happened."""
+        """Tell that something happened.
+
+        Raises
+        ------
+        ValueError
+            For a time that is no finite number, and words that are no text.
+        """
         if self.silenced:
             return
+        if t_s != t_s:
+            raise ValueError(f"event: expected a finite time, found {t_s!r} of {kind!r}")
         self.events.append(Event(t_s, kind, text))
 
     def count(self, name: str) -> int:
