@@ -13,7 +13,6 @@ from pilotage.core.types import Command, FloatArray, Twist, WheelSpeeds
 from pilotage.evaluation.tasks.task import Task
 from pilotage.experiments.build.team import Member
 from pilotage.experiments.odometry_since import OdometrySince
-from pilotage.models.motion.omnidirectional import OmnidirectionalConfig
 from pilotage.models.motion.wheel_drive import WheelDriveConfig
 from pilotage.records.trace import ROBOT_COLUMN
 from pilotage.sensors.readings import OdometryIncrement, Readings, UltrasonicReading
@@ -64,7 +63,7 @@ class Recorder:
         self._odometer = wheels[0] if wheels else None
         self._driven = OdometrySince()
         self._by_wheels = isinstance(member.known.motion, WheelDriveConfig)
-        self._sideways = isinstance(member.known.motion, OmnidirectionalConfig)
+        self._sideways = member.known.motion.drives_sideways
         tells_aside = thinned or self._by_wheels  # steps that add up to no arc
         self._lateral = self._sideways or (tells_aside and self._odometer is not None)
         self._rows = array("d")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import Field, model_validator
 
@@ -27,7 +27,14 @@ class MotionConfig(Config):
 
     A motion's config derives from this one; those whose limits follow from other numbers (a wheel drive's
     from its wheels) override the three properties.
+
+    Attributes
+    ----------
+    drives_sideways
+        Whether it follows a lateral speed, which is recorded then.
     """
+
+    drives_sideways: ClassVar[bool] = False
 
     delay_s: float = Field(default=0.0, ge=0.0, le=2.0)
     """From a command until the robot follows it: a multiple of the run's time step."""
