@@ -124,6 +124,21 @@ class TestImages:
         (tmp_path / "plain.pgm").write_text("P2\n# a comment\n3 2\n255\n0 40 80\n120 160 200\n")
         assert (read_grey(tmp_path / "plain.pgm")[0] == grey).all()
 
+    @pytest.mark.parametrize("name", ["a.png", "a.pgm", "a.tif", "plain.pgm"])
+    def test_sixteen_bits_are_read_as_they_are(self, tmp_path: Path, name: str) -> None:
+        path, deep = tmp_path / name, np.array([[0, 1, 32767], [32768, 52000, 65535]], np.uint16)
+        for grey in (deep, np.arange(6, dtype=np.uint16).reshape(2, 3) * 257 * 40):
+            if name == "plain.pgm":
+                path.write_text("P2\n3 2\n65535\n" + " ".join(map(str, grey.ravel())) + "\n")
+            else:
+                Image.fromarray(grey).save(path)
+            read, alpha = read_grey(path)
+            assert alpha is None
+            # Where 8 bits say all of it, it is what they say: thresholds and map_saver's greys hold.
+            assert (read == (grey if grey is deep else grey // 257)).all()
+            assert read.dtype == (np.uint16 if grey is deep else np.uint8)
+            assert (read_hazard_image(path, 1.0).blocked() == (grey > 32767)).all()
+
     def test_what_cannot_be_used_is_said_in_one_line(self, tmp_path: Path) -> None:
         path = tmp_path / "a.png"
         with pytest.raises(InputError, match="found none"):
@@ -131,9 +146,9 @@ class TestImages:
         Image.fromarray(np.zeros((2, 2, 3), np.uint8) + np.array([9, 0, 0], np.uint8)).save(path)
         with pytest.raises(InputError, match="coloured"):
             read_grey(path)
-        Image.fromarray(np.zeros((2, 2), np.uint16)).save(path)
-        with pytest.raises(InputError, match="8 bits"):
-            read_grey(path)
+        Image.fromarray(np.zeros((2, 2), np.int32)).save(tmp_path / "a.tif")
+        with pytest.raises(InputError, match="8 or 16 bits"):
+            read_grey(tmp_path / "a.tif")
         write_grey(path, np.zeros((50, 60), np.uint8))
         with pytest.raises(InputError, match="60 x 50"):
             read_grey(path, size=(60, 50))
@@ -166,6 +181,10 @@ def ros_maps(draw: st.DrawFn) -> RosMap:
     )
     pixels = draw(arrays(np.uint8, SHAPES))
     alpha = draw(st.none() | arrays(np.uint8, pixels.shape))
+    if alpha is None and draw(st.booleans()):
+        deep = pixels.astype(np.uint16) * 257
+        deep[0, 0] ^= 1  # not all of it would go into 8 bits
+        return RosMap(file, deep, None)
     return RosMap(file, pixels, alpha)
 
 
@@ -226,6 +245,20 @@ class TestRosMaps:
         assert RosMap(file, pixels, None).grid.cells.tolist() == [[OCCUPIED, expected, FREE, FREE]]
         painted = np.array([[0, grey, 254, 230]], np.uint8)
         assert RosMap(file, painted, None).grid.cells.tolist() == [[OCCUPIED, FREE, FREE, FREE]]
+
+    def test_sixteen_bits_are_scaled_to_one(self) -> None:
+        pixels = np.array([[0, 100, 25_700, 32_768, 52_600, 52_700, 65_535]], np.uint16)
+        expected = {
+            "trinary": [100, 100, -1, -1, -1, 0, 0],
+            "scale": [100, 100, 91, 67, 0, 0, 0],
+            "raw": [0, 0, 100, -1, -1, -1, -1],
+        }
+        for mode, cells in expected.items():
+            file = RosMapFile.model_validate(
+                {"image": "a.png", "mode": mode, "resolution": 1.0, "origin": (0, 0, 0)}
+                | {"free_thresh": 0.196, "occupied_thresh": 0.65}
+            )
+            assert RosMap(file, pixels).grid.cells.tolist() == [cells]
 
     def test_what_is_not_opaque_is_unknown_in_scale(self) -> None:
         file = RosMapFile(image="a.png", mode="scale", resolution=1.0, origin=(0, 0, 0))

@@ -9,17 +9,23 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from pilotage.core.errors import InputError
+from pilotage.core.files.images import pixel_bytes
 from pilotage.core.types import Pose2
 from pilotage.maps.image_file import opened_image
 from pilotage.maps.occupancy_grid import CORNER, FREE, OCCUPIED, OccupancyGrid
 
 ByteArray = NDArray[np.uint8]
+GreyArray = NDArray[np.uint8] | NDArray[np.uint16]
+"""Lightness from 0 to what the type can hold."""
 
 WHITE_FROM = 128
+DEEPEST = 65535
+STEP = 257
+"""What 8 bits become in 16: 255 and 65535 are both white."""
 
 
-def read_grey(path: Path, size: tuple[int, int] | None = None) -> tuple[ByteArray, ByteArray | None]:
-    """Read an image of 8 bits a pixel whose colours are all grey.
+def read_grey(path: Path, size: tuple[int, int] | None = None) -> tuple[GreyArray, ByteArray | None]:
+    """Read an image whose colours are all grey, of up to 16 bits a pixel.
 
     Parameters
     ----------
@@ -29,25 +35,35 @@ def read_grey(path: Path, size: tuple[int, int] | None = None) -> tuple[ByteArra
     Returns
     -------
     grey, alpha
-        (rows, columns) each; alpha is None where the image has none.
+        (rows, columns) each; alpha is None where the image has none. Grey has 8 bits wherever they say all.
 
     Raises
     ------
     InputError
         Where the image is missing, unreadable, coloured, of another depth or size, or too large.
     """
-    with opened_image(path, size, lambda image: len(image.getbands()) + 2) as image:
+    with opened_image(path, size, lambda image: 2 * pixel_bytes(image) + 1) as image:
         return _grey(image, path)
 
 
-def _grey(image: Image.Image, path: Path) -> tuple[ByteArray, ByteArray | None]:
+def as_bytes(grey: GreyArray) -> ByteArray:
+    """The same picture with 8 bits a pixel, rounded."""
+    if grey.dtype == np.uint8:
+        return np.asarray(grey, dtype=np.uint8)
+    return np.asarray((grey.astype(np.uint32) + STEP // 2) // STEP, dtype=np.uint8)
+
+
+def _grey(image: Image.Image, path: Path) -> tuple[GreyArray, ByteArray | None]:
+    # Pillow reads 16 bits of a PNG or PGM into 32; those of a TIFF with 32 have no white.
+    if image.mode.startswith("I;16") or (image.mode == "I" and image.format in ("PNG", "PPM")):
+        return _deep(image), None
     if image.mode == "P" or (image.mode in ("1", "L", "RGB") and "transparency" in image.info):
         image = image.convert("RGBA" if "transparency" in image.info else "RGB")
     if image.mode == "1":
         image = image.convert("L")
     if image.mode not in ("L", "LA", "RGB", "RGBA"):
         raise InputError(
-            f"image '{path}': expected grey pixels of 8 bits, found Pillow's mode {image.mode}; convert it"
+            f"image '{path}': expected grey pixels of 8 or 16 bits, found mode {image.mode}; convert it"
         )
     array = np.asarray(image)
     if array.ndim == 2:
@@ -59,7 +75,16 @@ def _grey(image: Image.Image, path: Path) -> tuple[ByteArray, ByteArray | None]:
     return grey, np.ascontiguousarray(array[..., -1]) if image.mode.endswith("A") else None
 
 
-def write_grey(path: Path, grey: ByteArray, alpha: ByteArray | None = None) -> None:
+def _deep(image: Image.Image) -> GreyArray:
+    """16 bits, or 8 where that loses nothing."""
+    grey = np.asarray(image).astype(np.uint16)
+    if (grey % STEP).any():
+        return grey
+    grey //= STEP
+    return grey.astype(np.uint8)
+
+
+def write_grey(path: Path, grey: GreyArray, alpha: ByteArray | None = None) -> None:
     """Write an image without loss; by suffix ``.pgm`` (which holds no alpha) or ``.png``.
 
     Raises
@@ -89,5 +114,5 @@ def read_hazard_image(
         As ``read_grey``, and for a resolution that is not above 0.
     """
     grey, _ = read_grey(path, size)
-    cells = np.where(grey >= WHITE_FROM, np.int8(OCCUPIED), np.int8(FREE))
+    cells = np.where(as_bytes(grey) >= WHITE_FROM, np.int8(OCCUPIED), np.int8(FREE))
     return OccupancyGrid(cells, resolution_m, origin)

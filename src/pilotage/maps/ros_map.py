@@ -3,7 +3,8 @@
 The rules are those of the Navigation 2 map server: lightness s in [0, 1] means occupancy p = 1 - s, or
 p = s with ``negate``. ``trinary``: occupied above ``occupied_thresh``, free below ``free_thresh``, else
 unknown. ``scale``: the same, but between the thresholds from 0 to 100 in proportion, and what is not
-opaque is unknown. ``raw``: the pixel's value itself from 0 to 100, others unknown.
+opaque is unknown. ``raw``: the pixel's value itself from 0 to 100, others unknown; of 16 bits a pixel, what
+8 would say.
 
 But for one thing: where an image has the greys alone that map_saver writes, 205 is what it was for map_saver,
 unknown. With the threshold that Navigation 2 writes beside it, 0.25, its own map server calls that free.
@@ -24,7 +25,7 @@ from pilotage.core.config import Config, validate
 from pilotage.core.errors import InputError
 from pilotage.core.files import read_yaml
 from pilotage.core.types import Pose2
-from pilotage.maps.grid_image import ByteArray, read_grey, write_grey
+from pilotage.maps.grid_image import DEEPEST, ByteArray, GreyArray, as_bytes, read_grey, write_grey
 from pilotage.maps.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyArray, OccupancyGrid
 
 SAVED_UNKNOWN, SAVED = 205, frozenset({0, 205, 254, 255})
@@ -70,7 +71,7 @@ class RosMap:
     """
 
     file: RosMapFile
-    pixels: ByteArray
+    pixels: GreyArray
     alpha: ByteArray | None = None
 
     @staticmethod
@@ -108,11 +109,13 @@ class RosMap:
         file = self.file
         if file.mode == "raw":
             raw = np.arange(256)
-            return _looked_up(np.where(raw <= OCCUPIED, raw, UNKNOWN).astype(np.int8), self.pixels)
+            return _looked_up(np.where(raw <= OCCUPIED, raw, UNKNOWN).astype(np.int8), as_bytes(self.pixels))
         if file.mode == "trinary" and self.alpha is not None:
             # map_server counts transparency as one more channel beside red, green and blue.
-            shade = (3.0 * self.pixels + self.alpha) / (4.0 * 255.0)
+            shade = (3.0 * as_bytes(self.pixels) + self.alpha) / (4.0 * 255.0)
             return self._occupancy(shade)
+        if self.pixels.dtype == np.uint16:
+            return _looked_up(self._occupancy(np.arange(DEEPEST + 1) / DEEPEST), self.pixels)
         table = self._occupancy(np.arange(256) / 255.0)
         if file.mode == "trinary" and not file.negate and SAVED.issuperset(np.unique(self.pixels).tolist()):
             table[SAVED_UNKNOWN] = UNKNOWN
@@ -135,8 +138,8 @@ class RosMap:
         return np.asarray(cells.astype(np.int8))
 
 
-def _looked_up(table: NDArray[Entry], pixels: ByteArray) -> NDArray[Entry]:
-    """Entries (256,) of pixels (H, W), row by row: an index of all would take 8 bytes a pixel."""
+def _looked_up(table: NDArray[Entry], pixels: GreyArray) -> NDArray[Entry]:
+    """Entries (one a grey) of pixels (H, W), row by row: an index of all would take 8 bytes a pixel."""
     out = np.empty(pixels.shape, table.dtype)
     for row, values in zip(out, pixels, strict=True):
         row[:] = table[values]

@@ -41,7 +41,7 @@ def opened_image(path: Path, what: str = "an image") -> Iterator[Image.Image]:
         try:
             with Image.open(file, formats=FORMATS) as image:
                 columns, rows = image.size
-                size, most = columns * rows * len(image.getbands()), limit(DATA_BYTES)
+                size, most = columns * rows * pixel_bytes(image), limit(DATA_BYTES)
                 if size > most:
                     raise too_large(f"{where} ({columns} x {rows} pixels)", most, size)
                 yield image
@@ -51,3 +51,10 @@ def opened_image(path: Path, what: str = "an image") -> Iterator[Image.Image]:
             raise InputError(f"{where}: cannot be read ({in_words(error)}); it may be cut short") from None
         finally:
             Image.MAX_IMAGE_PIXELS = guard
+
+
+def pixel_bytes(image: Image.Image) -> int:
+    """What Pillow takes for one pixel."""
+    if image.mode in ("I", "F"):
+        return 4
+    return 2 if image.mode.startswith("I;16") else len(image.getbands())

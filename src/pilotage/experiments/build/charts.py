@@ -20,7 +20,7 @@ from pilotage.maps.crater_cache import cached_crater_terrain
 from pilotage.maps.edge import closed
 from pilotage.maps.elevation_file import read_elevation
 from pilotage.maps.grid_file import GRID_SUFFIXES, read_grid
-from pilotage.maps.grid_image import read_grey, read_hazard_image
+from pilotage.maps.grid_image import as_bytes, read_grey, read_hazard_image
 from pilotage.maps.known_maps import known_map
 from pilotage.maps.landmark_image import read_landmark_image
 from pilotage.maps.landmark_table import read_landmark_table
@@ -205,7 +205,7 @@ def _images(source: ImagesMap) -> WorldMap:
     size = (int(hazards.cells.shape[0]), int(hazards.cells.shape[1]))
     picture = None
     if source.environment is not None:
-        picture, _ = read_grey(Path(source.environment), size)
+        picture = as_bytes(read_grey(Path(source.environment), size)[0])
     chart = WorldMap(
         "images", bounds_of(hazards), grid=hazards, picture=picture, open_ground=source.open_ground
     )
