@@ -55,6 +55,7 @@ def _readers() -> dict[str, tuple[str, Reader]]:
         "cell-map": ("a.txt", read_cell_map),
         "true-map": ("a.yaml", read_true_map),
         "elevation": ("a.json", read_elevation),
+        "ascii-grid": ("a.asc", read_elevation),
         "grey": ("a.png", read_grey),
         "moving-ai": ("a.map", read_moving_ai_map),
         "scenario": ("a.scen", read_scenario),
@@ -65,7 +66,7 @@ def _readers() -> dict[str, tuple[str, Reader]]:
 READERS = (
     *("yaml", "json", "npy", "npz", "parquet", "aer1513", "reckoning", "carmen", "heading", "barcodes"),
     *("landmarks", "landmark-table", "odometry", "steady", "tum", "kitti", "cell-map", "true-map"),
-    *("elevation", "grey", "moving-ai", "scenario", "ros"),
+    *("elevation", "ascii-grid", "grey", "moving-ai", "scenario", "ros"),
 )
 
 
@@ -86,6 +87,7 @@ SEEDS = {
     "cell-map": ("map-score text", "robot.txt"),
     "true-map": ("map-score yaml", "truth.yaml"),
     "elevation": ("plan heights json", "heights.json"),
+    "ascii-grid": ("plan heights asc", "heights.asc"),
     "grey": ("plan png", "grid.png"),
     "moving-ai": ("plan map", "grid.map"),
     "scenario": ("bench scen", "grid.scen"),

@@ -17,6 +17,7 @@ from scipy.interpolate import CubicSpline
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, Pose2
+from pilotage.experiments.build.charts import load_chart
 from pilotage.maps.crater_terrain import CraterTerrainConfig, crater_terrain
 from pilotage.maps.elevation import ElevationModel
 from pilotage.maps.elevation_file import read_elevation
@@ -131,6 +132,77 @@ class TestFiles:
         with pytest.raises(InputError, match=match):
             read_elevation(self.write(tmp_path, **change))
 
+    ASCII: dict[str, Any] = {  # noqa: RUF012 - read only
+        "ncols": 3,
+        "nrows": 2,
+        "xllcorner": 500_000.0,
+        "yllcorner": 4_649_776.5,
+        "cellsize": 0.5,
+        "NODATA_value": -32768,
+        "values": "1.5 -2e0\t3\n4 -32768 nan\n",
+    }
+
+    def write_ascii(self, folder: Path, **change: Any) -> Path:
+        whole = {key: value for key, value in (self.ASCII | change).items() if value is not None}
+        lines = [f"{key}   {value}\r\n" for key, value in whole.items() if key != "values"]
+        (folder / "ground.asc").write_text("".join(lines) + whole["values"], newline="")
+        return folder / "ground.asc"
+
+    def test_ascii_grid(self, tmp_path: Path) -> None:
+        model = read_elevation(self.write_ascii(tmp_path))
+        assert np.array_equal(model.elevation_m, [[1.5, -2.0, 3.0], [4.0, np.nan, np.nan]], equal_nan=True)
+        assert (model.resolution_m, model.origin) == (0.5, Pose2(500_000.0, 4_649_776.5, 0.0))
+        assert read_elevation(self.write_ascii(tmp_path), Pose2(1.0, 2.0, 0.1)).origin == Pose2(1.0, 2.0, 0.1)
+
+    @pytest.mark.parametrize(
+        ("change", "shape", "corner"),
+        [
+            ({"xllcorner": None, "XLLCENTER": 2, "NCOLS": 3, "ncols": None}, (2, 3), (1.75, 4_649_776.5)),
+            ({"cellsize": None, "dx": 1.0, "dy": 0.5}, (2, 6), (500_000.0, 4_649_776.5)),
+            ({"NODATA_value": None, "values": "1 2 3 4 5 -9999"}, (2, 3), (500_000.0, 4_649_776.5)),
+            ({"values": "nan 2\n3\n\n4 5 6\n"}, (2, 3), (500_000.0, 4_649_776.5)),
+        ],
+    )
+    def test_ascii_grids_of_other_programs(
+        self, tmp_path: Path, change: dict[str, Any], shape: tuple[int, int], corner: tuple[float, float]
+    ) -> None:
+        model = read_elevation(self.write_ascii(tmp_path, **change))
+        assert model.elevation_m.shape == shape
+        assert (model.origin.x_m, model.origin.y_m) == corner
+        assert np.isnan(model.elevation_m).any()
+
+    @pytest.mark.parametrize(
+        ("change", "match"),
+        [
+            ({"ncols": None}, "ncols: expected a whole number above 1, found none"),
+            ({"nrows": 1.5}, "nrows: expected a whole number above 1, found '1.5'"),
+            ({"xllcorner": None}, "xllcorner: missing"),
+            ({"yllcorner": "inf"}, "yllcorner: expected a place"),
+            ({"cellsize": 0}, "cellsize: expected a side of cells above 0 m, found 0"),
+            ({"cellsize": None, "dx": 1.0}, "dy: missing"),
+            ({"cells": 1}, "expected a header of cellsize, .*, found 'cells'"),
+            ({"NCOLS": 3}, "ncols: expected once, found twice"),
+            ({"values": "1 2 3 4 5"}, "expected 6 values for 3 x 2 cells, found 5; .* cut short"),
+            ({"values": ""}, "found 0; .* cut short"),
+            ({"values": "1 2 3 4,5 5 6"}, "row 2, column 1: expected a number, found '4,5'"),
+            ({"values": "1 2 3 4 5 1e400"}, "heights up to"),
+            ({"ncols": 3_000_000, "nrows": 3_000_000}, "needs about"),
+            ({"NODATA_value": None, "values": "1 2 3 4 5 -32768"}, "a mark for unknown that the file"),
+            ({"cellsize": 0.0002777, "values": "412 415 420 420 418 417"}, "or degrees"),
+        ],
+    )
+    def test_bad_ascii_grids_are_refused(self, tmp_path: Path, change: dict[str, Any], match: str) -> None:
+        with pytest.raises(InputError, match=match):
+            read_elevation(self.write_ascii(tmp_path, **change))
+
+    def test_an_ascii_grid_in_degrees_is_refused_by_its_projection(self, tmp_path: Path) -> None:
+        path = self.write_ascii(tmp_path)
+        (tmp_path / "ground.prj").write_text('PROJCS["UTM",GEOGCS["GCS_WGS_1984"]]')
+        read_elevation(path)
+        (tmp_path / "ground.prj").write_text('GEOGCS["GCS_WGS_1984"]')
+        with pytest.raises(InputError, match=r"found degrees in ground\.prj"):
+            read_elevation(path)
+
     @pytest.mark.parametrize(
         ("turned_rad", "row_m", "first"), [(0.0, -10.0, 1.0), (0.0, 10.0, 2.0), (0.3, -10.0, None)]
     )
@@ -155,13 +227,19 @@ class TestFiles:
         assert np.isnan(model.elevation_m).sum() == 1
         assert (model.origin.x_m, model.origin.y_m) == (1000.0, 480.0 if row_m < 0.0 else 500.0)
 
+    def test_a_geotiff_taken_for_an_image_of_obstacles(self, tmp_path: Path) -> None:
+        (tmp_path / "dem.tif").write_bytes(b"")
+        with pytest.raises(InputError, match=r"heights: {name: elevation, file: dem\.tif}$"):
+            load_chart(str(tmp_path / "dem.tif"))
+
     def test_missing_or_other(self, tmp_path: Path) -> None:
         for name in ("none.json", "none.tif"):
             with pytest.raises(InputError, match="found none"):
                 read_elevation(tmp_path / name)
         (tmp_path / "a.json").write_text("{")
         (tmp_path / "a.txt").write_text("")
-        for name in ("a.json", "a.txt"):
+        (tmp_path / "a.asc").write_text("")
+        for name in ("a.json", "a.txt", "a.asc"):
             with pytest.raises(InputError, match="expected"):
                 read_elevation(tmp_path / name)
 

@@ -18,7 +18,7 @@ from pilotage.evaluation.relief import relief
 from pilotage.experiments.rehearsal import rehearsed
 from pilotage.experiments.values import parse_override, parse_yaml, read_text
 from pilotage.maps.elevation import ElevationModel
-from pilotage.maps.elevation_file import read_elevation
+from pilotage.maps.elevation_file import HEIGHTS_ALONE, read_elevation
 from pilotage.maps.grid_file import GRID_SUFFIXES, read_grid
 from pilotage.maps.memory import require_memory
 from pilotage.maps.occupancy_grid import OccupancyGrid, near_blocked
@@ -51,7 +51,7 @@ def is_grid_map(source: str) -> bool:
     """Whether a name on the command line is the file of a grid or of heights rather than a map of walls."""
     path = Path(source)
     suffix = path.suffix.lower()
-    if suffix == ".json":
+    if suffix in HEIGHTS_ALONE:
         return True
     if suffix not in GRID_SUFFIXES:
         return False
@@ -154,7 +154,7 @@ class _Ground:
 def _read(path: Path, settings: GridMapConfig, slope_limit_deg: float | None) -> _Ground:
     origin = None if settings.origin is None else Pose2(*settings.origin)
     if slope_limit_deg is None:
-        if path.suffix.lower() == ".json":
+        if path.suffix.lower() in HEIGHTS_ALONE:
             raise InputError(f"{path}: expected --slope-limit DEG with an elevation model, found none")
         if settings.slope_that_doubles_deg is not None:
             raise InputError(

@@ -1,4 +1,4 @@
-"""Elevation models from files: raw arrays with a JSON side file, and GeoTIFF."""
+"""Elevation models from files: raw arrays with a JSON side file, ESRI ASCII grids, GeoTIFF, NumPy arrays."""
 
 from __future__ import annotations
 
@@ -13,11 +13,16 @@ from pilotage.core.extras import missing
 from pilotage.core.files import read_bytes, read_json, require_file
 from pilotage.core.limits import DATA_BYTES, limit, too_large
 from pilotage.core.types import Pose2
+from pilotage.maps.ascii_grid import read_ascii_grid
 from pilotage.maps.elevation import ElevationModel, HeightArray
-from pilotage.maps.grid_file import read_array
+from pilotage.maps.grid_file import GEOTIFF, read_array
 from pilotage.maps.memory import require_memory
 from pilotage.maps.occupancy_grid import CORNER
 
+HEIGHTS_ALONE = frozenset({".json", ".asc"})
+"""Suffixes of files that hold heights and nothing else."""
+STEEPEST = 20.0
+"""Times the map's diagonal that heights may span: beyond is a mark for unknown, or cells in degrees."""
 MOST_BYTES = 12 * DATA_BYTES // 4
 """What a model takes while it is read: twelve bytes for each height of four."""
 FORMATS = {
@@ -33,9 +38,9 @@ FORMATS = {
 def read_elevation(
     path: Path, origin: Pose2 | None = None, resolution_m: float | None = None
 ) -> ElevationModel:
-    """Read a JSON side file (and the raw array that it describes), a GeoTIFF, or a NumPy array of heights.
+    """Read a JSON side file (and its raw array), an ESRI ASCII grid, a GeoTIFF, or a NumPy array of heights.
 
-    Without ``origin`` a GeoTIFF lies where it says, another model with its corner at 0, 0.
+    Without ``origin`` a GeoTIFF or ASCII grid lies where it says, another model with its corner at 0, 0.
     Cells that are not square are stretched along the rows, linearly, until they are.
 
     Parameters
@@ -46,19 +51,37 @@ def read_elevation(
     Raises
     ------
     InputError
-        Where a file is missing, cut short, or does not say what is needed; for a GeoTIFF also where
-        rasterio is not installed.
+        Where a file is missing, cut short, or does not say what is needed, and where its heights cannot be
+        in the unit of its cells; for a GeoTIFF also where rasterio is not installed.
     """
     require_file(path, "an elevation model")
+    model = _read(path, origin, resolution_m)
+    rows, columns = model.elevation_m.shape
+    low, high = (float(pick.reduce(model.elevation_m, axis=None)) for pick in (np.fmin, np.fmax))
+    if high - low > STEEPEST * model.resolution_m * math.hypot(rows, columns):
+        raise InputError(
+            f"elevation '{path}': expected heights and cells in metres, found heights from {low:g} to "
+            f"{high:g} on a map of {columns * model.resolution_m:g} x {rows * model.resolution_m:g}: a mark "
+            "for unknown that the file does not name, or degrees (project it, gdalwarp)"
+        )
+    return model
+
+
+def _read(path: Path, origin: Pose2 | None, resolution_m: float | None) -> ElevationModel:
     if path.suffix.lower() == ".npy":
         return _read_npy(path, resolution_m, CORNER if origin is None else origin)
     if resolution_m is not None:
         raise InputError(f"elevation '{path}': expected its resolution in the file, found one here as well")
     if path.suffix.lower() == ".json":
         return _read_raw(path, CORNER if origin is None else origin)
-    if path.suffix.lower() in (".tif", ".tiff"):
+    if path.suffix.lower() == ".asc":
+        return _read_ascii(path, origin)
+    if path.suffix.lower() in GEOTIFF:
         return _read_geotiff(path, origin)
-    raise InputError(f"elevation '{path}': expected a .json side file, .tif or .npy, found '{path.suffix}'")
+    raise InputError(
+        f"elevation '{path}': expected .asc, .tif, .npy or a .json side file, found '{path.suffix}'; "
+        "gdal_translate -of AAIGrid makes an .asc of most"
+    )
 
 
 def _read_npy(path: Path, resolution_m: float | None, origin: Pose2) -> ElevationModel:
@@ -126,13 +149,23 @@ def _positive(side: dict[str, Any], key: str, path: Path) -> float:
     return value
 
 
+def _read_ascii(path: Path, origin: Pose2 | None) -> ElevationModel:
+    grid = read_ascii_grid(path)
+    with np.errstate(over="ignore"):  # what becomes infinite is refused
+        heights = grid.values.astype(np.float32)
+    corner = Pose2(*grid.corner_m, 0.0) if origin is None else origin
+    return _squared(heights, grid.row_m, grid.column_m, corner)
+
+
 def _read_geotiff(path: Path, origin: Pose2 | None) -> ElevationModel:
     """The first band; the cells' size in the file's own units, which have to be metres."""
     try:
         import rasterio
     except ImportError:
         raise missing(
-            f"elevation '{path}': GeoTIFF needs rasterio, which is not installed", "terrain"
+            f"elevation '{path}': GeoTIFF needs rasterio (or gdal_translate -of AAIGrid, which makes "
+            "an .asc of it), which is not installed",
+            "terrain",
         ) from None
     try:
         # Its other drivers follow what a file says to other files, on the network too.

@@ -15,7 +15,8 @@ from pilotage.maps.moving_ai import read_moving_ai_map
 from pilotage.maps.occupancy_grid import CORNER, OccupancyGrid
 from pilotage.maps.ros_map import read_ros_map
 
-IMAGES = frozenset({".png", ".pgm", ".pbm", ".bmp", ".tif", ".tiff", ".jpg", ".jpeg"})
+GEOTIFF = frozenset({".tif", ".tiff"})
+IMAGES = frozenset({".png", ".pgm", ".pbm", ".bmp", ".jpg", ".jpeg"}) | GEOTIFF
 GRID_SUFFIXES = frozenset({".map", ".npy", ".yaml", ".yml"}) | IMAGES
 
 
@@ -49,11 +50,12 @@ def read_grid(path: Path, resolution_m: float | None = None, origin: Pose2 | Non
         )
     if suffix in IMAGES:
         if resolution_m is None:
+            heights = f"; heights: {{name: elevation, file: {path.name}}}" if suffix in GEOTIFF else ""
             raise InputError(
                 f"{path}: expected a resolution in metres a pixel for an image (white is an obstacle), found "
                 "none: plan --set map.resolution_m=0.05, draw --resolution 0.05, in a mission world.map: "
                 f"{{name: grid, file: {path.name}, resolution_m: 0.05}}; dark walls on white: a ROS map's "
-                "YAML with image, resolution and origin"
+                f"YAML with image, resolution and origin{heights}"
             )
         return read_hazard_image(path, resolution_m, place)
     raise InputError(f"{path}: expected a grid map ({', '.join(sorted(GRID_SUFFIXES))}), found '{suffix}'")

@@ -41,7 +41,7 @@ class ImagesMap(Config):
 
 
 class ElevationMap(Config):
-    """An elevation model: GeoTIFF, a raw array with its JSON side file, or a NumPy array."""
+    """An elevation model: ESRI ASCII grid, GeoTIFF, a raw array with its JSON side file, or a NumPy array."""
 
     name: Literal["elevation"]
     file: str = Field(min_length=1)

@@ -91,6 +91,12 @@ def _heights(folder: Path) -> None:
     (folder / "heights.json").write_text(json.dumps(side))
 
 
+def _ascii_heights(folder: Path) -> None:
+    lines = ["ncols 16", "nrows 12", "xllcorner 0", "yllcorner 0", "cellsize 1", "NODATA_value -9999"]
+    lines += [" ".join([f"{0.5 * row:.2f}"] * 16) for row in range(12)]
+    (folder / "heights.asc").write_text("\n".join(lines) + "\n")
+
+
 def _cells(folder: Path) -> None:
     true = true_map(SheetFile.model_validate(SHEET))
     (folder / "printed.txt").write_text(format_cell_map(true.cells, 3600.0))
@@ -137,6 +143,12 @@ TARGETS: tuple[Target, ...] = (
     ),
     Target(
         "plan heights bin", _heights, ("plan", "heights.json", *ROOM, "--slope-limit", "60"), ("heights.bin",)
+    ),
+    Target(
+        "plan heights asc",
+        _ascii_heights,
+        ("plan", "heights.asc", *ROOM, "--slope-limit", "60"),
+        ("heights.asc",),
     ),
     Target("bench scen", _moving_ai, ("bench-scen", "grid.map", "grid.scen"), ("grid.scen", "grid.map")),
     Target("map-score text", _cells, ("map-score", "robot.txt", "truth.txt"), ("robot.txt", "truth.txt")),

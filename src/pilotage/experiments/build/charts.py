@@ -18,7 +18,7 @@ from pilotage.core.types import Pose2
 from pilotage.experiments.values import parse_yaml, read_text
 from pilotage.maps.crater_cache import cached_crater_terrain
 from pilotage.maps.edge import closed
-from pilotage.maps.elevation_file import read_elevation
+from pilotage.maps.elevation_file import HEIGHTS_ALONE, read_elevation
 from pilotage.maps.grid_file import GRID_SUFFIXES, read_grid
 from pilotage.maps.grid_image import as_bytes, read_grey, read_hazard_image
 from pilotage.maps.known_maps import known_map
@@ -35,7 +35,6 @@ from pilotage.missions.map_choice import CraterMap, ElevationMap, GridMap, Image
 from pilotage.missions.world import MarkingsConfig, WorldConfig
 
 SHIPPED = resources.files("pilotage.missions") / "maps"
-ELEVATION_SUFFIXES = frozenset({".json", ".tif", ".tiff"})
 PLAIN = MarkingsConfig()
 MapSource = str | MapFile | SheetFile | CraterMap | ImagesMap | ElevationMap | GridMap
 
@@ -97,7 +96,7 @@ def _read(source: MapSource, markings: MarkingsConfig) -> WorldMap:
             slope_limit_deg=source.slope_limit_deg,
             open_ground=True,
         )
-    if path.suffix.lower() == ".json":
+    if path.suffix.lower() in HEIGHTS_ALONE:
         raise InputError(f"world.map.file: expected a grid map, found '{path}'; take name: elevation")
     return replace(_grid(path, source.resolution_m, origin), open_ground=source.open_ground)
 
@@ -140,9 +139,9 @@ def _named(source: str, markings: MarkingsConfig) -> WorldMap:
             raise unknown_name("map", source, shipped_maps())
         return _of_values(parse_yaml((SHIPPED / f"{source}.yaml").read_text(), source), source, markings)
     if not path.is_file():
-        beside = hint_beside(path, {".yaml", ".yml", *GRID_SUFFIXES, *ELEVATION_SUFFIXES})
+        beside = hint_beside(path, {".yaml", ".yml", *GRID_SUFFIXES, *HEIGHTS_ALONE})
         raise InputError(f"map '{source}': expected a map file, found none there{beside}")
-    if suffix in ELEVATION_SUFFIXES and suffix == ".json":
+    if suffix in HEIGHTS_ALONE:
         return _read(validate(ElevationMap, {"name": "elevation", "file": source}, "map"), markings)
     if suffix in {".yaml", ".yml"}:
         values = parse_yaml(read_text(path), str(path))
@@ -156,7 +155,8 @@ def _named(source: str, markings: MarkingsConfig) -> WorldMap:
         return _grid(path)
     raise InputError(
         f"map '{source}': expected a map of walls or a sheet (.yaml), a ROS map (.yaml with an image), or a "
-        f"grid ({', '.join(sorted(GRID_SUFFIXES))}), found '{suffix}'"
+        f"grid ({', '.join(sorted(GRID_SUFFIXES))}) or heights ({', '.join(sorted(HEIGHTS_ALONE))}), "
+        f"found '{suffix}'"
     )
 
 
