@@ -77,6 +77,22 @@ def test_who_explores_nothing_is_refused_before_it_drives() -> None:
         build(load_mission("museum-unknown", ["stack.navigator=open-loop"], 0))
 
 
+@pytest.mark.parametrize(
+    ("mission", "changes", "named"),
+    [
+        ("museum-unknown", ["task=reach", "world.goal={x_m: 20, y_m: 12}"], "task 'reach'.*'floor-frontier'"),
+        ("museum-unknown", ["task={name: follow, points_m: [[3, 1]]}"], "task 'follow'.*'floor-frontier'"),
+        ("museum-unknown", ["task=sweep-floor"], "task 'sweep-floor'.*'floor-frontier'"),
+        ("museum-patrol", ["stack.navigator=floor-frontier"], "task 'patrol'.*'floor-frontier'"),
+        ("romi-explore", ["task=reach", "world.goal={x_m: 0.9, y_m: 0.9}"], "task 'reach'.*'frontier'"),
+    ],
+)
+def test_who_chooses_its_places_is_refused_for_others(mission: str, changes: list[str], named: str) -> None:
+    """It explored, and was told that it ended 160 m from its goal."""
+    with pytest.raises(InputError, match=named):
+        build(load_mission(mission, changes, 0))
+
+
 def test_hits_are_counted_only_where_there_is_room(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("pilotage.maps.memory.available_bytes", lambda: 10**9)
     with pytest.raises(InputError, match=r"stack\.mapper: counting hits in cells: needs about .* GB"):

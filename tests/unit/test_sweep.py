@@ -185,7 +185,19 @@ def test_a_pass_that_the_maps_cells_tell_nothing_of_is_refused(width_m: float) -
         build(mission_of(changed))
     planner = BoustrophedonPlanner(BoustrophedonConfig(width_m=width_m, overlap_m=0.0))
     request = PlanRequest(Pose2(1.0, 1.0, 0.0), Goal(1.0, 1.0), world.field, np.random.default_rng(0))
-    assert planner.plan(request).reason == f"planner 'boustrophedon': {sweep}"
+    with pytest.raises(InputError, match=f"planner 'boustrophedon': {sweep}".replace("+", r"\+")):
+        planner.plan(request)
+
+
+def test_a_pass_much_wider_than_the_body_is_planned_in_cells_that_know_where_the_body_fits() -> None:
+    """Cells of a twelfth of the width were wider than the passage that it starts in."""
+    walls = np.array([[0, 0, 9, 0], [9, 0, 9, 8], [9, 8, 0, 8], [0, 8, 0, 0], [0, 0.5, 8, 0.5]], dtype=float)
+    bounds_m = (0.0, 0.0, 9.0, 8.0)
+    world = WorldMap("floor", bounds_m, geometry=SegmentMap(walls, np.zeros((0, 3)), bounds_m))
+    planner = BoustrophedonPlanner(BoustrophedonConfig(width_m=7.0, clearance_m=0.22))
+    start, goal = Pose2(0.25, 0.25, 0.0), Goal(0.25, 0.25)
+    result = planner.plan(PlanRequest(start, goal, world.field, np.random.default_rng(0)))
+    assert result.path is not None, result.reason
 
 
 def test_a_goal_that_is_walled_off_is_no_path() -> None:

@@ -23,6 +23,8 @@ MOST_CELLS = 400_000
 """Larger floors take coarser cells: a distance costs a search over all of them."""
 CELLS_A_PASS = 4
 """The least that tell whether a pass went beside another one."""
+FINE_CELLS = 12
+"""Cells a pass that tell what is swept; larger floors take coarser ones."""
 SNAP_M = 0.5
 """A place whose cell is too near to a wall stands for the nearest one that is not, this near."""
 
@@ -50,6 +52,14 @@ def check_pass_width(bounds_m: tuple[float, float, float, float], width_m: float
             f"{where}: expected a width_m of {least_m:.3g} to {most_m:.3g} for a map of {xmax - xmin:g} m x "
             f"{ymax - ymin:g} m, found {width_m:g}"
         )
+
+
+def pass_cell_m(width_m: float, radius_m: float) -> float:
+    """Side of the cells that tell what a pass swept, no coarser than for a pass as wide as its robot.
+
+    Wider passes would have cells in which passages are lost that the robot fits through.
+    """
+    return min(width_m, 2.0 * radius_m or width_m) / FINE_CELLS
 
 
 @dataclass(frozen=True, eq=False)

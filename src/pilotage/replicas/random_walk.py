@@ -38,6 +38,7 @@ class RandomWalk:
     edge. One front sensor and both line sensors are used, as in the report.
     """
 
+    CHOOSES_PLACES: ClassVar[bool] = True
     TAKES: ClassVar = frozenset({"pose", "plan", "heading"})
 
     def __init__(

@@ -59,6 +59,7 @@ class SurroundCheck:
     Fails by its pose, and where the nearest explored cell is behind a box.
     """
 
+    CHOOSES_PLACES: ClassVar[bool] = True
     TAKES: ClassVar = frozenset({"pose", "plan", "heading"})
 
     def __init__(

@@ -165,5 +165,7 @@ NAVIGATORS: Registry[Stack] = Registry(
 """Whole stacks; built as ``cls(config, robot, chart, task, parts, journal)``: a ``RobotKnowledge``, a
 ``WorldMap``, a ``TaskKnowledge``, the ``Parts`` that the mission names, and the ``Journal`` to write into.
 
+One that chooses by itself where to go has a true ``CHOOSES_PLACES``: the places of a task are nothing to it.
+
 One that patrols may tell those who plan for it how long its paths are, by a static method ``roadmap(config,
 robot, chart, places)`` as ``PatrolNavigator`` has it; without one edges are as long as the graph says."""

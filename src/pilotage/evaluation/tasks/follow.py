@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -33,6 +34,8 @@ class FollowTask(WatchedTask):
     The points are the robot's goals, one after the other; how it drives between them is its stack's affair,
     and its distance from the straight lines between them is told.
     """
+
+    gives_places: ClassVar[bool] = True
 
     def __init__(self, config: FollowConfig, setting: TaskSetting) -> None:
         for x, y in config.points_m:

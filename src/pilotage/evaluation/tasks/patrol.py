@@ -71,6 +71,7 @@ class PatrolTask:
     columns: Mapping[str, str]
     goals: tuple[GoalConfig, ...]
     drives: ClassVar[bool] = True
+    gives_places: ClassVar[bool] = True
 
     def __init__(self, config: PatrolConfig, setting: TaskSetting) -> None:
         mission = setting.mission

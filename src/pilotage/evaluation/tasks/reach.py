@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -43,6 +43,8 @@ THERE = "the goal is reached"
 @TASKS.add("reach", ReachConfig)
 class ReachTask(WatchedTask):
     """Done when every robot says that it has arrived; a success if it truly has, and nothing was touched."""
+
+    gives_places: ClassVar[bool] = True
 
     def __init__(self, config: ReachConfig, setting: TaskSetting) -> None:
         mission = setting.mission

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -15,11 +16,10 @@ from pilotage.evaluation.finished import FinishedRun, RobotRun, Verdict
 from pilotage.evaluation.tasks.task import TASKS, Attempt, TaskSetting
 from pilotage.evaluation.tasks.watched import WatchedTask
 from pilotage.kernels.patrol.swept import mark_swept
-from pilotage.maps.floor import Floor, check_pass_width, sweepable
+from pilotage.maps.floor import Floor, check_pass_width, pass_cell_m, sweepable
 from pilotage.missions.places import GoalConfig
 from pilotage.sensors.sensor import NonNegative, Positive
 
-CELLS_A_WIDTH = 12
 BACK_M = 0.5
 
 
@@ -45,6 +45,8 @@ class SweepTask(WatchedTask):
     nothing left to do.
     """
 
+    gives_places: ClassVar[bool] = True
+
     def __init__(self, config: SweepConfig, setting: TaskSetting) -> None:
         mission = setting.mission
         if len(mission.members) != 1:
@@ -56,7 +58,7 @@ class SweepTask(WatchedTask):
         super().__init__((back,) if mission.goal_of(robot) is None else ())
         self._config, self._width_m = config, config.width_m or 2.0 * radius_m
         check_pass_width(setting.chart.bounds_m, self._width_m, "task 'sweep-floor'")
-        cell_m = self._width_m / CELLS_A_WIDTH
+        cell_m = pass_cell_m(self._width_m, radius_m)
         place = start.x_m, start.y_m
         floor = Floor.of(setting.chart, radius_m, cell_m, place, exact=True)
         # By two cells less than a pass reaches: cells tell where a passage becomes narrow no better.

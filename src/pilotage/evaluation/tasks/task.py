@@ -55,7 +55,8 @@ class Task(Protocol):
     One with places that a team shares out has ``patrol`` besides, a ``PatrolSite``, of which every robot is
     told. One that is about a certain floor has a static method ``about(config)``: a place on it, or None.
 
-    One that judges what a robot hands over in the end has ``wants`` besides, the names of that.
+    One that judges what a robot hands over in the end has ``wants`` besides, the names of that. One about
+    places that a robot is told, goals or those of a patrol, has a true ``gives_places``.
     """
 
     columns: Mapping[str, str]

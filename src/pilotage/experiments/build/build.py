@@ -23,7 +23,7 @@ from pilotage.maps.world_map import WorldMap
 from pilotage.missions.mission import Mission
 from pilotage.sensors.beacon import BeaconConfig
 from pilotage.sim.source import Simulator
-from pilotage.stack.interface import StackStatus
+from pilotage.stack.interface import NAVIGATORS, StackStatus
 from pilotage.stack.knowledge import RobotKnowledge
 
 
@@ -99,6 +99,7 @@ def build(mission: Mission) -> Experiment:
     streams = RandomStreams(mission.run.seed)
     sheets = [_data_sheet(mission, index, streams) for index in range(len(mission.members))]
     _check_places(mission, chart, sheets)
+    _check_heeded(mission)
     task = _task(mission, chart, sheets)
     for number, place in enumerate(task.goals):
         where = f"task '{mission.task.name}', goal {number}"
@@ -174,6 +175,19 @@ def _check_places(mission: Mission, chart: WorldMap, sheets: Sequence[RobotKnowl
                     f"team.stations.{index}: expected room for two robots beside team.stations.{other}, "
                     f"found {apart:.2f} m between them; move one of them"
                 )
+
+
+def _check_heeded(mission: Mission) -> None:
+    """Refuse a navigator that chooses its places itself for a task that is about others."""
+    if not getattr(TASKS.entry(mission.task.name).factory, "gives_places", False):
+        return
+    for robot in mission.members:
+        name = mission.stack_of(robot).navigator.name
+        if getattr(NAVIGATORS.entry(name).factory, "CHOOSES_PLACES", False):
+            raise InputError(
+                f"task '{mission.task.name}': expected a navigator that goes where the task says, found "
+                f"'{name}', which chooses by itself where to go, as task explore asks for"
+            )
 
 
 def _check_wanted(mission: Mission, task: Task, team: Sequence[Member]) -> None:

@@ -55,6 +55,7 @@ class FrontierExplorer:
     and it looks for no tape's end.
     """
 
+    CHOOSES_PLACES: ClassVar[bool] = True
     TAKES: ClassVar = frozenset({"pose", "plan"})
 
     def __init__(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from enum import StrEnum
+from typing import ClassVar
 
 import numpy as np
 
@@ -71,6 +72,8 @@ class FloorExplorer(LocalizingNavigator):
     Frontiers with walls in sight come first, and rooms that are seen through gaps without room for its
     clearance last, by paths that its body takes.
     """
+
+    CHOOSES_PLACES: ClassVar[bool] = True
 
     def __init__(
         self,

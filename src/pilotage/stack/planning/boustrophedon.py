@@ -12,7 +12,7 @@ from pilotage.core.config import Config
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
 from pilotage.kernels.tours.entries import anneal_entries
-from pilotage.maps.floor import Floor
+from pilotage.maps.floor import Floor, check_pass_width
 from pilotage.sensors.sensor import Positive
 from pilotage.stack.planning.driving_space import clearance_of, failure
 from pilotage.stack.planning.field_search import path_of_line
@@ -57,8 +57,9 @@ class BoustrophedonPlanner:
     The floor is cut into cells where lines split and join, and cells are put in a good order; of both
     directions of lines the path is taken that wastes less. Then it is changed at random, as a whole, until it
     is short for what it sweeps; what is left is swept by detours. Swept is all of the floor where the robot's
-    centre can be, by cells of a twelfth of the width. Of the rim along walls that only its body reaches,
-    corners are left (2 to 5 % of the floor) that would take three times the path that their area does.
+    centre can be, by cells of a twelfth of the width or less. Of the rim along walls that only its body
+    reaches, corners are left (2 to 5 % of the floor) that would take three times the path that their area
+    does.
 
     Whoever drove it asks with its trail, and gets a path to what that left, as far as it knows.
     """
@@ -74,8 +75,16 @@ class BoustrophedonPlanner:
         return self._config.clearance_m
 
     def plan(self, request: PlanRequest) -> PlanResult:
-        """Sweep all that can be reached from the start, and end at the goal."""
+        """Sweep all that can be reached from the start, and end at the goal.
+
+        Raises
+        ------
+        InputError
+            As ``check_pass_width``.
+        """
         began = time.perf_counter()
+        # The map never grows: what its cells cannot tell is a mistake in the mission, not the field's affair.
+        check_pass_width(request.field.bounds_m, self._config.width_m, "stack.planner 'boustrophedon'")
         clearance_m, width_m = clearance_of(request, self._config.clearance_m), self._config.width_m
         start, goal = ((place.x_m, place.y_m) for place in (request.start, request.goal))
         radius_m = clearance_m if request.footprint is None else min(request.footprint.radius_m, clearance_m)

@@ -12,8 +12,8 @@ import scipy
 from pilotage.core.types import BoolArray, FloatArray
 from pilotage.kernels.patrol.swept import mark_swept
 from pilotage.maps.distance_field import DistanceField
-from pilotage.maps.floor import Floor, check_pass_width, sweepable
-from pilotage.stack.planning.sweep_room import FINE_CELLS, Keeping, path_floor
+from pilotage.maps.floor import Floor, pass_cell_m, sweepable
+from pilotage.stack.planning.sweep_room import Keeping, path_floor
 
 STEP_M = 0.002
 """Stretches of a trail on which its radius differs by less are taken together, with the least of it."""
@@ -44,10 +44,10 @@ class Sought:
 
 
 def whole_floor(field: DistanceField, keeping: Keeping, width_m: float, overlap_m: float) -> Sought:
-    """All of the floor, and the rim that only the body reaches; InputError as ``check_pass_width``."""
-    check_pass_width(field.bounds_m, width_m, "planner 'boustrophedon'")
+    """All of the floor, and the rim that only the body reaches; InputError where the body does not fit."""
     radius_m, inside = keeping.radius_m, keeping.start_xy_m
-    floor = Floor.of_field(field, field.bounds_m, radius_m, width_m / FINE_CELLS, inside, exact=True)
+    cell_m = pass_cell_m(width_m, radius_m)
+    floor = Floor.of_field(field, field.bounds_m, radius_m, cell_m, inside, exact=True)
     inner = path_floor(field, keeping, width_m)
     rim = sweepable(floor, width_m) & ~floor.reachable
     must = floor.reachable & _within_reach(floor, inner, 0.5 * width_m - floor.cell_m)

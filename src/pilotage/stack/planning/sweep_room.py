@@ -11,10 +11,8 @@ import scipy
 from pilotage.core.types import BoolArray
 from pilotage.kernels.grids.travel_cost import travel_costs
 from pilotage.maps.distance_field import DistanceField
-from pilotage.maps.floor import Floor, cell_side_m
+from pilotage.maps.floor import Floor, cell_side_m, pass_cell_m
 
-FINE_CELLS = 12
-"""Cells a width that tell what is swept; larger floors take coarser ones."""
 FINEST_M = 0.02
 """Side of the cells of paths, larger on large floors: passages with less than this to spare may be missed."""
 MOST_CELLS = 1_000_000
@@ -42,7 +40,7 @@ def path_floor(field: DistanceField, keeping: Keeping, width_m: float) -> Floor:
     keeps half a diagonal. Nobody keeps so much that what is beside a wall is out of a pass' reach.
     """
     bounds_m, inside, radius_m = field.bounds_m, keeping.start_xy_m, keeping.radius_m
-    told_m = cell_side_m(bounds_m, width_m / FINE_CELLS)
+    told_m = cell_side_m(bounds_m, pass_cell_m(width_m, radius_m))
     cell_m = cell_side_m(bounds_m, min(FINEST_M, told_m), MOST_CELLS)
     half_m = math.sqrt(0.5) * cell_m
     tight = Floor.of_field(
