@@ -7,12 +7,15 @@ import math
 import numpy as np
 import scipy
 
-from pilotage.core.types import BoolArray, FloatArray
+from pilotage.core.types import BoolArray, FloatArray, IntArray
 from pilotage.kernels.patrol.swept import mark_swept
 from pilotage.maps.floor import Floor
 from pilotage.stack.planning.sweep_floor import Sought, covered
 
 DETOUR_ROUNDS = 6
+MOST_PAIRS, MOST_LEFT, MOST_STANDS = 10_000_000, 1_000, 5_000
+"""Cells to be swept times places to sweep them from that are weighed; where there are more, some of either in
+turn: what the others need is found in the next round."""
 
 
 def completed(sought: Sought, path: FloatArray) -> FloatArray:
@@ -49,14 +52,24 @@ def _places_for(sought: Sought, path: FloatArray, missing: BoolArray) -> FloatAr
         window = slice(low[0], high[0] + 1), slice(low[1], high[1] + 1)
         cells = np.argwhere(inner.reachable[window])
         stand = np.array(inner.origin_xy_m) + (cells + low + 0.5)[:, ::-1] * inner.cell_m
-        near = ((stand[:, None] - left[None]) ** 2).sum(axis=2) <= reach_m**2
         worth = 1.0 / (0.5 * reach_m + away_m[window][tuple(cells.T)])
+        if len(stand) * len(left) > MOST_PAIRS:
+            left = left[:: math.ceil(len(left) / MOST_LEFT)]
+            some = _some_of(stand, left)
+            stand, worth = stand[some], worth[some]
+        near = ((stand[:, None] - left[None]) ** 2).sum(axis=2) <= reach_m**2
         while near.any():
             # What is swept by a metre of detour.
             best = int(np.argmax(near.sum(axis=1) * worth))
             found.append(stand[best])
             near[:, near[best]] = False
     return np.array(found).reshape(-1, 2)
+
+
+def _some_of(stand: FloatArray, left: FloatArray) -> IntArray:
+    """Indices of places (N, 2): some of all, and for each point (M, 2) the one that is nearest to it."""
+    _, nearest = scipy.spatial.cKDTree(stand).query(left)
+    return np.union1d(np.arange(0, len(stand), math.ceil(len(stand) / MOST_STANDS)), nearest)
 
 
 def _pieces(floor: Floor, missing: BoolArray, width_m: float) -> list[FloatArray]:
