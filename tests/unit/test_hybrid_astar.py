@@ -217,12 +217,12 @@ def test_a_large_floor_is_crossed_with_few_expansions() -> None:
 def test_where_greed_finds_nothing_patience_does() -> None:
     world, start, goal = YARDS["a narrow gate"], Pose2(1.5, 4.5, 0.0), Goal(7.5, 5.5, 0.0)
     patient = HybridAstarPlanner(HybridAstarConfig(greed=1.0)).plan(request(world, start, goal))
-    # Enough for one expansion: the greedy search is stopped at the second.
+    # Enough for one expansion: the greedy searches from either end are stopped at the second.
     both = HybridAstarPlanner(HybridAstarConfig(greedy_share=1e-5)).plan(request(world, start, goal))
     assert patient.path is not None
     assert both.path is not None
     assert np.array_equal(both.path.states, patient.path.states)
-    assert both.iterations == patient.iterations + 2
+    assert both.iterations == patient.iterations + 4
 
 
 def test_where_all_cells_were_looked_at_in_vain_smaller_ones_find_a_path() -> None:
@@ -240,3 +240,31 @@ def test_where_all_cells_were_looked_at_in_vain_smaller_ones_find_a_path() -> No
         c, s = math.cos(theta), math.sin(theta)
         around = corners, long.radius_m, world.segments_m, world.circles_m
         assert outline_clearance(x, y, c, s, *around) > 0.0
+
+
+CAR_AT_THE_KERB = Footprint.polygon(np.array([[0.8, 0.3], [-0.2, 0.3], [-0.2, -0.3], [0.8, -0.3]]))
+
+
+@pytest.mark.parametrize(("gap_m", "kerb_m"), [(1.9, 0.07), (1.6, 0.07), (1.45, 0.1), (1.4, 0.15)])
+@pytest.mark.parametrize("parks", [True, False])
+def test_a_car_of_a_metre_parks_in_a_gap_not_much_longer_and_leaves_it(
+    gap_m: float, kerb_m: float, parks: bool
+) -> None:
+    """Steps of 25 cm lead nowhere between two cars: it looked for half a minute where 13 moves do."""
+    end = 4.0 + gap_m
+    street = [[0, 0, 10, 0], [10, 0, 10, 3.2], [10, 3.2, 0, 3.2], [0, 3.2, 0, 0]]
+    cars = [[2, 0, 2, 0.7], [2, 0.7, 4, 0.7], [4, 0.7, 4, 0], [end, 0, end, 0.7], [end, 0.7, 8, 0.7]]
+    world = SegmentMap(np.array([*street, *cars], dtype=float), np.zeros((0, 3)), (0.0, 0.0, 10.0, 3.2))
+    poses = [Pose2(1.0, 1.6, 0.0), Pose2(4.0 + 0.5 * (gap_m - 1.0) + 0.2, kerb_m + 0.3, 0.0)]
+    start, goal = poses if parks else poses[::-1]
+    ask = request(world, start, Goal(goal.x_m, goal.y_m, goal.theta_rad))
+    ask = replace(ask, footprint=CAR_AT_THE_KERB, least_turning_radius_m=0.6 / math.tan(0.5))
+    result = HybridAstarPlanner(HybridAstarConfig()).plan(ask)
+    assert result.path is not None, result.reason
+    assert result.iterations < 100_000
+    check_car_path(result.path, start, ask.goal, 1.1 * ask.least_turning_radius_m)
+    corners = np.ascontiguousarray(CAR_AT_THE_KERB.points_m)
+    for x, y, theta in result.path.states:
+        c, s = math.cos(theta), math.sin(theta)
+        around = corners, CAR_AT_THE_KERB.radius_m, world.segments_m, world.circles_m
+        assert outline_clearance(x, y, c, s, *around) > 0.04

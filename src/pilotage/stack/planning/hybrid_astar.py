@@ -3,26 +3,20 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
 from pydantic import Field
 
 from pilotage.core.config import Config
-from pilotage.core.types import FloatArray
-from pilotage.kernels.rrt import hybrid, reeds_shepp
-from pilotage.kernels.rrt.clearance import Space
-from pilotage.kernels.rrt.samples import Bound
+from pilotage.core.types import Goal, Pose2
+from pilotage.kernels.rrt import hybrid
 from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.planning.driving_space import SPARE, failure, spaced_waypoints
-from pilotage.stack.planning.outline import (
-    blocked_pose,
-    car_of,
-    goal_pose,
-    ground_of,
-    shut_for,
-    word_states,
-)
+from pilotage.stack.planning.hybrid_query import STEP_CELLS, Found, Grain, HybridQuery
+from pilotage.stack.planning.outline import blocked_pose, car_of, goal_pose, ground_of, shut_for
 from pilotage.stack.planning.planner import PLANNERS, Path, PlanRequest, PlanResult, PlanStatus
 from pilotage.stack.planning.rough_path import look_around
 
@@ -32,6 +26,11 @@ LEAST_RADIUS_M = 0.3
 
 FINER = 0.5
 """Side of the cells, over that of those that were all looked at in vain, for one more search."""
+POCKET_EXPANSIONS = 2_000
+"""From an end in a pocket no more poses are reached, and smaller steps have to lead out of it."""
+POCKET_STEPS = tuple(0.4 * 0.85**k for k in range(12))
+"""Length of those steps, one after the other, over that of all others. Which cells are entered well is
+chance, and a search that leads nowhere ends at once: many lengths cost little."""
 
 
 class HybridAstarConfig(Config):
@@ -59,6 +58,9 @@ class HybridAstarConfig(Config):
 @PLANNERS.add("hybrid-astar", HybridAstarConfig)
 class HybridAstarPlanner:
     """Drives forwards and backwards on arcs that the car can drive, its outline clear of everything.
+
+    Where greed finds nothing, and from an end a few steps lead nowhere, smaller ones lead out of there: from
+    the goal, too, backwards in time, as a car leaves a gap that it could not find into.
 
     Resolution complete only: a bay that fits with less than a cell to spare may be missed. A goal without a
     heading is taken to have that of the straight line to it, or where the outline does not fit so the one
@@ -93,78 +95,73 @@ class HybridAstarPlanner:
             return failure(PlanStatus.NO_PATH, shut_for(car, clearance_m), time.perf_counter() - began)
         size = 6 * config.most_expansions + 8
         nodes, parents = np.empty((size, 3)), np.empty((size, 3))
-        ended, last, word, expanded = self._searched(start, goal, car, ground, around.bound, nodes, parents)
+        query = HybridQuery(start, goal, car, ground, around.bound, nodes, parents)
+
+        def from_its_end() -> HybridQuery:
+            back = replace(
+                request, start=Pose2(*goal.tolist()), goal=Goal(request.start.x_m, request.start.y_m)
+            )
+            return query.from_its_end(look_around(back, ground, car.inner + clearance_m, False, True).bound)
+
+        query, found, expanded = self._searched(query, from_its_end)
         took = time.perf_counter() - began
-        if ended != hybrid.FOUND:
-            why = "the search was exhausted" if ended == hybrid.NO_PATH else "the search was given up"
+        if found.ended != hybrid.FOUND:
+            why = "the search was exhausted" if found.ended == hybrid.NO_PATH else "the search was given up"
             return failure(PlanStatus.NO_PATH, f"{why} after {expanded} expansions", took, expanded)
-        states, length_m = _states(start, parents, last, word, turning_m)
+        states, length_m = query.states(found)
         path = Path(states, spaced_waypoints(states, 1.0), length_m, turning_m)
         reason = f"{length_m:.2f} m after {expanded} expansions"
         return PlanResult(PlanStatus.FOUND, reason, path, took, time.perf_counter() - began, expanded)
 
     def _searched(
-        self,
-        start: FloatArray,
-        goal: FloatArray,
-        car: hybrid.Car,
-        ground: Space,
-        bound: Bound,
-        nodes: FloatArray,
-        parents: FloatArray,
-    ) -> tuple[int, int, FloatArray, int]:
-        """As ``hybrid.search``: greedily for a while, where that finds nothing with patience, and where that
-        has no cell left, some of which it entered badly, greedily once more among cells of half the side."""
-        config = self._config
+        self, query: HybridQuery, from_its_end: Callable[[], HybridQuery]
+    ) -> tuple[HybridQuery, Found, int]:
+        """Greedily for a while, where that finds nothing out of pockets, then with patience, and where that
+        has no cell left, some of which it entered badly, greedily once more among cells of half the side.
+
+        Returns
+        -------
+        Whose search it was, how that ended, and how many nodes were expanded in all.
+        """
+        config, expanded = self._config, 0
+        grain = Grain(config.step_m, config.cell_m, config.headings)
         first = int(config.greedy_share * config.most_expansions) if config.greed > 1.0 else 0
-        step_m, expanded, ended = max(config.step_m, 1.5 * config.cell_m), 0, hybrid.NO_PATH
-        for greed, most, cell_m in (
-            (config.greed, first, config.cell_m),
-            (1.0, config.most_expansions, config.cell_m),
-            (config.greed, config.most_expansions, FINER * config.cell_m),
-        ):
-            looked_at_all = ended == hybrid.NO_PATH
-            if most == 0 or (cell_m < config.cell_m and not looked_at_all):
-                continue
-            prices = hybrid.Prices(config.reverse_cost, config.switch_cost_m, config.turn_cost, greed)
-            ended, last, word, count = hybrid.search(
-                start,
-                goal,
-                car,
-                ground,
-                prices,
-                bound,
-                step_m,
-                cell_m,
-                config.headings,
-                most,
-                nodes,
-                parents,
+        if first > 0:
+            found = query.search(self._prices(config.greed), grain, first)
+            expanded += found.expanded
+            if found.ended == hybrid.FOUND:
+                return query, found, expanded
+            back = from_its_end()
+            pocket = min(POCKET_EXPANSIONS, first)
+            for end, seen in (
+                (back, back.search(self._prices(config.greed), grain, pocket)),
+                (query, found),
+            ):
+                expanded += seen.expanded if end is back else 0
+                out, count = self._out_of_pocket(end, seen, grain, first)
+                expanded += count
+                if out.ended == hybrid.FOUND:
+                    return end, out, expanded
+        found = query.search(self._prices(1.0), grain, config.most_expansions)
+        expanded += found.expanded
+        if found.ended == hybrid.NO_PATH:
+            fine = replace(
+                grain, step_m=max(grain.step_m, STEP_CELLS * grain.cell_m), cell_m=FINER * grain.cell_m
             )
-            expanded += count
-            if ended == hybrid.FOUND:
+            found = query.search(self._prices(config.greed), fine, config.most_expansions)
+            expanded += found.expanded
+        return query, found, expanded
+
+    def _out_of_pocket(self, query: HybridQuery, seen: Found, grain: Grain, most: int) -> tuple[Found, int]:
+        """Where steps lead nowhere from a query's start, by smaller ones, as long as these lead nowhere."""
+        found, expanded = seen, 0
+        for share in POCKET_STEPS:
+            if found.ended != hybrid.NO_PATH or (found is seen and seen.expanded > POCKET_EXPANSIONS):
                 break
-        return ended, last, word, expanded
+            found = query.search(self._prices(self._config.greed), grain.finer(share), most)
+            expanded += found.expanded
+        return found, expanded
 
-
-def _states(
-    start: FloatArray,
-    parents: FloatArray,
-    last: int,
-    word: FloatArray,
-    turning_m: float,
-) -> tuple[FloatArray, float]:
-    """(N, 3) states along the steps and the last curve, and the path's length."""
-    steps = []
-    node = last
-    while parents[node, 0] >= 0.0:
-        steps.append((parents[node, 1], parents[node, 2] / turning_m))
-        node = int(parents[node, 0])
-    words = [np.array([step]) for step in reversed(steps)] + [word]
-    states, total = [start[None, :]], 0.0
-    for part in words:
-        states.append(word_states(states[-1][-1], part, turning_m))
-        for piece in part:
-            total += reeds_shepp.word_length(piece[None, :], turning_m)
-    along = np.concatenate(states)
-    return (along if len(along) > 1 else np.repeat(along, 2, axis=0)), total
+    def _prices(self, greed: float) -> hybrid.Prices:
+        config = self._config
+        return hybrid.Prices(config.reverse_cost, config.switch_cost_m, config.turn_cost, greed)
