@@ -14,10 +14,14 @@ from pilotage.core.whole_number import whole_number
 from pilotage.experiments.build import team
 from pilotage.experiments.build.build import build, build_source
 from pilotage.experiments.build.charts import load_chart
+from pilotage.experiments.build.places import check_place
 from pilotage.experiments.mission import load_mission
 from pilotage.experiments.studies.engine import run_study
 from pilotage.experiments.studies.replay import parse_row
 from pilotage.experiments.studies.sweep import sweep_study
+from pilotage.maps.occupancy_grid import OccupancyGrid
+from pilotage.maps.world_map import WorldMap
+from pilotage.models.footprint import Footprint
 from pilotage.stack.control.local.sampling import NoiseBank
 from pilotage.tracking.robot_colour import parse_hsv
 
@@ -91,6 +95,24 @@ def test_who_chooses_its_places_is_refused_for_others(mission: str, changes: lis
     """It explored, and was told that it ended 160 m from its goal."""
     with pytest.raises(InputError, match=named):
         build(load_mission(mission, changes, 0))
+
+
+@pytest.mark.parametrize(
+    ("cells", "told"),
+    [
+        ([[0, 100], [-1, 0]], r"found an unknown cell at \(1, 1\); move it$"),
+        ([[0, 0], [100, 0]], r"found an occupied cell at \(1, 1\); move it$"),
+        ([[-1, 100], [100, -1]], r"found an occupied cell .* no cell of the map is free: check negate, mode"),
+    ],
+)
+def test_a_place_in_no_free_cell_is_told_so(cells: list[list[int]], told: str) -> None:
+    """It was told "0.000 m to the nearest wall; make the body smaller", where all of a map was unknown."""
+    grid = OccupancyGrid(np.array(cells, np.int8), 2.0)
+    chart = WorldMap("cells", (0.0, 0.0, 4.0, 4.0), grid=grid)
+    with pytest.raises(InputError, match=f"world.start: expected a free cell, {told}"):
+        check_place("world.start", 1.0, 1.0, Footprint.disc(0.2), chart)
+    if cells[0][0] == 0:
+        check_place("world.start", 1.0, 3.0, Footprint.disc(0.2), chart)
 
 
 def test_hits_are_counted_only_where_there_is_room(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -217,15 +217,19 @@ class TestReport:
 @pytest.mark.parametrize(
     ("words", "told"),
     [
+        (["world.start.x_m=305"], "world.start: expected a free cell, found a hazard at (305, 45); move it"),
         (
-            ["world.start.x_m=305"],
+            ["world.start.x_m=299"],
             "world.start: expected at least the body's radius of 1.5 m to the nearest hazard",
         ),
         (
             ["world.goal.x_m=600.1"],
             "world.goal: expected a place on the map 'images' (0 to 600, -10 to 390 m)",
         ),
-        (["world.goal.x_m=300", "world.goal.y_m=45"], "found 0.000 m at (300, 45)"),
+        (
+            ["world.goal.x_m=300", "world.goal.y_m=45"],
+            "world.goal: expected a free cell, found a hazard at (300, 45)",
+        ),
         (["world.map.resolution_m=0"], "greater than 0, found 0"),
         (["world.map.obstacles=nowhere.png"], "expected an image, found none there"),
         (["world.map.name=image"], "unknown world.map.name 'image'; did you mean 'images'?"),

@@ -19,6 +19,7 @@ from pilotage.kernels.grids.blocked_distance import distance_to_blocked
 from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.floor import Floor
 from pilotage.maps.known_maps import OncePerMap
+from pilotage.maps.occupancy_grid import UNKNOWN
 from pilotage.maps.world_map import WorldMap
 from pilotage.missions.mission import Mission
 from pilotage.missions.places import Kidnap, PoseConfig
@@ -173,6 +174,7 @@ def check_place(where: str, x_m: float, y_m: float, footprint: Footprint, chart:
             f"{where}: expected a place on the map '{chart.name}' ({xmin:g} to {xmax:g}, "
             f"{ymin:g} to {ymax:g} m), found ({x_m:g}, {y_m:g})"
         )
+    _check_free(where, x_m, y_m, chart)
     needed = footprint.inner_radius_m
     clear = room_m(chart, x_m, y_m, needed)
     if clear < needed:
@@ -182,6 +184,24 @@ def check_place(where: str, x_m: float, y_m: float, footprint: Footprint, chart:
             f"{where}: expected at least {what} of {needed:g} m to the nearest {nearest}, "
             f"found {clear:.3f} m at ({x_m:g}, {y_m:g}); move it or make the body smaller"
         )
+
+
+def _check_free(where: str, x_m: float, y_m: float, chart: WorldMap) -> None:
+    """Refuse a place in a cell that is none to drive on, and say what cell that is."""
+    grid = chart.grid
+    if grid is None or chart.geometry is not None:
+        return
+    row, column = grid.cell_at(x_m, y_m)
+    if not grid.contains(row, column) or not grid.blocked()[row, column]:
+        return
+    solid = "a hazard" if chart.open_ground else "an occupied cell"
+    found = "an unknown cell" if grid.cells[row, column] == UNKNOWN else solid
+    remedy = "move it"
+    if grid.blocked().all():
+        remedy = (
+            "no cell of the map is free: check negate, mode and thresholds of its file, or its slope limit"
+        )
+    raise InputError(f"{where}: expected a free cell, found {found} at ({x_m:g}, {y_m:g}); {remedy}")
 
 
 def room_m(chart: WorldMap, x_m: float, y_m: float, asked_m: float) -> float:
