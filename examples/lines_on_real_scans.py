@@ -57,7 +57,7 @@ def lines_of(log: CarmenLog) -> list[Scan]:
         c, s = math.cos(pose[2] + aside), math.sin(pose[2] + aside)
         turn = np.array([[c, s], [-s, c]])
         lines = (found.ends_m.reshape(-1, 2) @ turn + pose[:2]).reshape(-1, 4)
-        returned = np.flatnonzero(ranges < EXTRACTION.max_range_m)
+        returned = np.flatnonzero(ranges < scanner.sure_range_m)
         scans.append(Scan(found, lines, found.points_m @ turn + pose[:2], returned, pose))
     return scans
 

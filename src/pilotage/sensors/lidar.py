@@ -10,6 +10,9 @@ from pydantic import Field
 from pilotage.core.types import FloatArray
 from pilotage.sensors.sensor import SENSORS, NonNegative, Positive, SensorConfig
 
+SURE_SHARE = 0.995
+"""Of a scanner's reach."""
+
 
 @SENSORS.add_config("lidar")
 class LidarConfig(SensorConfig):
@@ -19,6 +22,11 @@ class LidarConfig(SensorConfig):
     field_of_view_rad: float = Field(default=math.radians(270.0), gt=0.0, le=2.0 * math.pi)
     max_range_m: Positive = 20.0
     range_var_m2: NonNegative = 9.62015e-6
+
+    @property
+    def sure_range_m(self) -> float:
+        """A reading up to here is an echo; nearer to the reach one that is none may seem to be."""
+        return SURE_SHARE * self.max_range_m
 
     @property
     def beam_step_rad(self) -> float:

@@ -122,7 +122,7 @@ class EkfWallsLocalizer:
                 robot,
                 chart,
                 lidar,
-                config.lines.max_range_m,
+                config.lines.max_range_m or lidar.sure_range_m,
                 self._matcher,
                 self._mount,
                 self._prediction,

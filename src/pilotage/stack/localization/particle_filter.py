@@ -76,8 +76,8 @@ class MclConfig(Config):
     resolution_m: Positive = 0.05
     """Of the field around walls that are known exactly; a grid's field has the grid's own."""
     beams: int = Field(default=60, ge=1)
-    max_range_m: Positive = 19.9
-    """Readings beyond are left out."""
+    max_range_m: Positive | None = None
+    """Readings beyond are left out. None: those beyond what the scanner surely reaches."""
     range_var_m2: Positive | None = None
     field_std_m: NonNegative | None = None
     """What the map is wrong by; added to the range's variance. None: 1 cm, of a grid a third of a cell
@@ -159,7 +159,7 @@ class ParticleFilterLocalizer:
         angles = lidar.beam_angles_rad()[self._picked] + lidar.mount.theta_rad
         self._directions = np.column_stack([np.cos(angles), np.sin(angles)])
         self._mount_xy = np.array([lidar.mount.x_m, lidar.mount.y_m])
-        self._max_range = min(config.max_range_m, lidar.max_range_m)
+        self._max_range = min(config.max_range_m or lidar.sure_range_m, lidar.max_range_m)
         self._rng = robot.streams.stream(NAME)
         self._quantile = float(scipy.special.ndtri(config.kld_probability))
         self._poses = _draw(initial, config.most_particles, self._rng)

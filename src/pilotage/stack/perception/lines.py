@@ -23,11 +23,11 @@ UNIFORMS = 512
 class LineExtractionConfig(Config):
     """From a scan to lines.
 
-    A reading over ``max_range_m`` is no wall, and a cluster of fewer than ``cluster_points`` is dropped, as
-    in the night-watch report.
+    A reading over ``max_range_m`` is no wall (None: over what the scanner surely reaches), and a cluster of
+    fewer than ``cluster_points`` is dropped, as in the night-watch report.
     """
 
-    max_range_m: Positive = 19.9
+    max_range_m: Positive | None = None
     cutoff_m: Positive = 0.5
     """Points no farther apart belong to one cluster."""
     cluster_points: int = Field(default=10, ge=2)
@@ -97,7 +97,7 @@ class LineExtractor:
         self._var = range_var_m2
         self._threshold = config.inlier_sigmas * float(np.sqrt(range_var_m2))
         self._end_margin = max(config.end_margin_m, self._threshold)
-        self._max_range = min(config.max_range_m, np.nextafter(lidar.max_range_m, 0.0))
+        self._max_range = min(config.max_range_m or lidar.sure_range_m, np.nextafter(lidar.max_range_m, 0.0))
         self._step = lidar.beam_step_rad
         self._directions = clustering.beam_directions(
             float(lidar.beam_angles_rad()[0]), lidar.beam_step_rad, lidar.beams
