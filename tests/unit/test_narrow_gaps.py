@@ -54,3 +54,19 @@ def test_a_gap_narrower_than_the_robot_is_gone_around_or_said_to_be_closed() -> 
         around = _plan("theta-star", _room(CLEARANCE_M - 0.01, turn_rad, offset_m, door=True)).path
         assert around is not None
         assert around.length_m > 6.6
+
+
+@pytest.mark.parametrize("name", ["theta-star", "astar"])
+@pytest.mark.parametrize("scale", [0.05, 0.03])
+def test_a_small_robot_fits_through_the_doors_of_its_small_world(name: str, scale: float) -> None:
+    """Between nodes 10 cm apart no line was sure to keep 1 cm: no path through a door of 11 cm."""
+    large = _room(1.1, 0.3, 0.05, door=False)
+    room = SegmentMap(scale * large.segments_m, np.zeros((0, 3)), (0.0, 0.0, 10.0 * scale, 8.0 * scale))
+    planner = PLANNERS.entry(name).factory(PLANNERS.configure(name, {}, name))
+    start, goal = Pose2(2.0 * scale, 4.0 * scale, 0.0), Goal(8.0 * scale, 4.0 * scale)
+    field, clearance_m = DistanceField.from_map(room), CLEARANCE_M * scale
+    result = planner.plan(PlanRequest(start, goal, field, np.random.default_rng(0), clearance_m))
+    assert result.path is not None, result.reason
+    assert result.path.length_m < 6.6 * scale
+    kept_m = plane.least_distance(result.path.states[:, :2], room.segments_m, room.circles_m)
+    assert kept_m > clearance_m - 1e-6
