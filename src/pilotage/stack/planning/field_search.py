@@ -40,8 +40,8 @@ def plan_over_nodes(
     """Answer a planning query by a search over the nodes of its distance field.
 
     Nodes are free where lines between them keep the clearance everywhere. Gaps that are too narrow for that
-    are looked at on finer nodes where one would save a longer path (``line_through_gaps``). Where nothing is found for
-    a robot that is small beside the nodes' spacing, everything is.
+    are looked at on finer nodes where one would save a longer path (``line_through_gaps``). Where nothing
+    is found for a robot that is small beside the nodes' spacing, everything is.
 
     The path turns on the spot where it bends.
 
