@@ -31,6 +31,9 @@ TABLE_PER_STD, TABLE_STDS = 50, 12
 """The table of a beam's density: entries per standard deviation, and how many of these."""
 LEAST_MAPPED = 0.5
 """Share of a scan that has to end where the map says anything."""
+SPACING_M, MOST_NODES = 0.05, 4_000_000
+"""Between the nodes that know what is nearest, and how many there are at most where cells are smaller: of
+things that lie no farther apart than nodes do the wrong one is nearest."""
 BESIDE_CELLS = 2
 """A beam that ends so few cells beyond the known ones may have hit the wall before them."""
 
@@ -55,7 +58,7 @@ class LikelihoodField:
         self,
         chart: WorldMap,
         *,
-        resolution_m: float,
+        resolution_m: float | None,
         range_var_m2: float,
         field_std_m: float | None,
         random_share: float,
@@ -75,7 +78,7 @@ class LikelihoodField:
                 f"'{chart.name}'; see stack.map"
             )
         self._half_m, self._bounds_m = half_m, chart.bounds_m
-        self._nearest = _nearest_of(chart, walls, resolution_m)
+        self._nearest = _nearest_of(chart, walls, _spacing_m(chart) if resolution_m is None else resolution_m)
         self._known = _known_of(chart)
         std_m = math.sqrt(range_var_m2 + (least_std_m if field_std_m is None else field_std_m) ** 2)
         if std_m == 0.0:
@@ -163,6 +166,15 @@ _NEAREST: OncePerMap[NearestObstacles] = OncePerMap()
 def _nearest_of(chart: WorldMap, walls: SegmentMap, resolution_m: float) -> NearestObstacles:
     """What of a map's walls is nearest where; robots that are told the same map work it out once."""
     return _NEAREST.get(chart, resolution_m, lambda: NearestObstacles.from_map(walls, resolution_m))
+
+
+def _spacing_m(chart: WorldMap) -> float:
+    """Between nodes: as near as the map's cells, where memory allows."""
+    if chart.geometry is not None or chart.grid is None:
+        return SPACING_M
+    width_m, height_m = chart.grid.size_m
+    least_m = math.sqrt(width_m * height_m / MOST_NODES)
+    return min(SPACING_M, max(chart.grid.resolution_m, least_m))
 
 
 def _known_of(chart: WorldMap) -> OccupancyGrid | None:

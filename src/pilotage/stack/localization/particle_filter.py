@@ -73,8 +73,8 @@ class MclConfig(Config):
     """Width of the kernel that moves resampled particles apart, in standard deviations of the cloud."""
     most_rounds: int = Field(default=30, ge=1)
     """Parts after which the rest of a scan is let in at once."""
-    resolution_m: Positive = 0.05
-    """Of the field around walls that are known exactly; a grid's field has the grid's own."""
+    resolution_m: Positive | None = None
+    """Of the field around walls. None: 5 cm, or a cell's side where that is less."""
     beams: int = Field(default=60, ge=1)
     max_range_m: Positive | None = None
     """Readings beyond are left out. None: those beyond what the scanner surely reaches."""

@@ -1,0 +1,50 @@
+"""Worlds of a metre: a robot knows where it is there as it does in large ones."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+import pilotage as pl
+from pilotage.maps.grid_image import write_grey
+
+SIDE_M = 0.005
+
+
+def map_file(folder: Path) -> str:
+    """A room of 1.6 m x 1.1 m with walls of 1.5 cm in it."""
+    boxes = [(0.5, 0.0, 0.515, 0.4), (0.5, 0.55, 0.515, 1.1), (1.0, 0.0, 1.015, 0.55), (0.7, 0.2, 0.75, 0.25)]
+    grey = np.full((220, 320), 254, np.uint8)
+    grey[:2] = grey[-2:] = grey[:, :2] = grey[:, -2:] = 0
+    for box in boxes:
+        x0, y0, x1, y1 = (round(side / SIDE_M) for side in box)
+        grey[220 - y1 : 220 - y0, x0:x1] = 0
+    write_grey(folder / "small.pgm", grey)
+    (folder / "small.yaml").write_text(f"image: small.pgm\nresolution: {SIDE_M}\norigin: [0, 0, 0]\n")
+    return str(folder / "small.yaml")
+
+
+def test_a_particle_filter_is_not_sure_of_what_is_wrong(tmp_path: Path) -> None:
+    """Nodes 5 cm apart knew another cell for the nearest: off by 5 std, and said to be localized."""
+    mission = {
+        "mission": "small",
+        "world": {"map": map_file(tmp_path), "start": {"x_m": 0.25, "y_m": 0.3, "theta_rad": 1.0}},
+        "robot": {
+            "footprint": {"radius_m": 0.02},
+            "sensors": {
+                "odometry": {"name": "wheel-odometry", "rate_hz": 10},
+                "lidar": {"name": "lidar", "beams": 360, "field_of_view_rad": 6.28, "max_range_m": 0.8},
+            },
+        },
+        "task": {"name": "localize", "tolerance_m": 0.02},
+        "stack": {
+            "navigator": {"name": "open-loop", "speed_m_s": 0.05, "turn_rate_rad_s": 0.6, "duration_s": 12.0},
+            "localizer": "particle-filter",
+            "initial": {"x_var_m2": 1e-6, "y_var_m2": 1e-6, "theta_var_rad2": 1e-3},
+        },
+    }
+    run = pl.run(mission, save=False, progress=False)
+    assert run.success, run.reason
+    assert run.metrics["nees_mean"] < 6.0
+    assert run.metrics["position_rmse_m"] < 0.003
