@@ -268,3 +268,25 @@ def test_a_car_of_a_metre_parks_in_a_gap_not_much_longer_and_leaves_it(
         c, s = math.cos(theta), math.sin(theta)
         around = corners, CAR_AT_THE_KERB.radius_m, world.segments_m, world.circles_m
         assert outline_clearance(x, y, c, s, *around) > 0.04
+
+
+def test_a_lorry_crosses_its_yard_in_steps_of_its_own_size() -> None:
+    """In steps of 25 cm it gave up, some metres from where it began."""
+    sides = [[0, 0, 128, 0], [128, 0, 128, 88], [128, 88, 0, 88], [0, 88, 0, 0]]
+    halls = [[40, 0, 40, 32], [40, 44, 40, 88], [80, 0, 80, 48], [80, 60, 80, 88]]
+    racks = [[40, 52, 60, 52], [70, 52, 80, 52], [100, 24, 112, 24], [112, 24, 112, 34], [16, 56, 24, 56]]
+    walls = np.array([*sides, *halls, *racks], dtype=float)
+    world = SegmentMap(walls, np.zeros((0, 3)), (0.0, 0.0, 128.0, 88.0))
+    lorry = Footprint.polygon(np.array([[5.3, 2.0], [-1.3, 2.0], [-1.3, -2.0], [5.3, -2.0]]))
+    turning_m = 4.0 / math.tan(0.5)
+    start, goal = Pose2(12.0, 12.0, 0.3), Goal(116.0, 76.0, 0.0)
+    ask = replace(request(world, start, goal), footprint=lorry, least_turning_radius_m=turning_m)
+    result = HybridAstarPlanner(HybridAstarConfig()).plan(ask)
+    assert result.path is not None, result.reason
+    assert result.path.length_m < 1.5 * math.hypot(104.0, 64.0)
+    check_car_path(result.path, start, goal, 1.1 * turning_m)
+    corners = np.ascontiguousarray(lorry.points_m)
+    for x, y, theta in result.path.states[::4]:
+        c, s = math.cos(theta), math.sin(theta)
+        around = corners, lorry.radius_m, world.segments_m, world.circles_m
+        assert outline_clearance(x, y, c, s, *around) > 0.0

@@ -26,6 +26,8 @@ LEAST_RADIUS_M = 0.3
 
 FINER = 0.5
 """Side of the cells, over that of those that were all looked at in vain, for one more search."""
+TURN_STEPS = 8.0
+"""Steps to a turning radius: a large vehicle that is lost among many takes longer ones, once."""
 POCKET_EXPANSIONS = 2_000
 """From an end in a pocket no more poses are reached, and smaller steps have to lead out of it."""
 POCKET_STEPS = tuple(0.4 * 0.85**k for k in range(12))
@@ -116,8 +118,9 @@ class HybridAstarPlanner:
     def _searched(
         self, query: HybridQuery, from_its_end: Callable[[], HybridQuery]
     ) -> tuple[HybridQuery, Found, int]:
-        """Greedily for a while, where that finds nothing out of pockets, then with patience, and where that
-        has no cell left, some of which it entered badly, greedily once more among cells of half the side.
+        """Greedily for a while, for large vehicles so in longer steps; where that finds nothing out of
+        pockets, then with patience, and where that has no cell left, some of which it entered badly, greedily
+        once more among cells of half the side.
 
         Returns
         -------
@@ -131,6 +134,12 @@ class HybridAstarPlanner:
             expanded += found.expanded
             if found.ended == hybrid.FOUND:
                 return query, found, expanded
+            longer = query.car.turning / (TURN_STEPS * grain.step_m)
+            if longer > 1.0 and found.ended == hybrid.EXHAUSTED:
+                coarse = query.search(self._prices(config.greed), grain.coarser(longer), first)
+                expanded += coarse.expanded
+                if coarse.ended == hybrid.FOUND:
+                    return query, coarse, expanded
             back = from_its_end()
             pocket = min(POCKET_EXPANSIONS, first)
             for end, seen in (

@@ -32,6 +32,10 @@ class Grain:
         cell_m = min(self.cell_m, step_m / (STEP_CELLS + 1.0))
         return Grain(step_m, cell_m, math.ceil(self.headings / share))
 
+    def coarser(self, times: float) -> Grain:
+        """Steps and cells so many times as long; as many headings."""
+        return Grain(times * self.step_m, times * self.cell_m, self.headings)
+
 
 @dataclass(frozen=True, slots=True)
 class Found:
