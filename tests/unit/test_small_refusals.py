@@ -115,6 +115,15 @@ def test_a_place_in_no_free_cell_is_told_so(cells: list[list[int]], told: str) -
         check_place("world.start", 1.0, 3.0, Footprint.disc(0.2), chart)
 
 
+def test_a_speed_beyond_the_motions_is_told_by_whose_it_is() -> None:
+    """It named ``robot.motion.max_speed_m_s``, a key that a motion by its wheels does not have."""
+    wheels = ["robot.motion=wheel-drive"]
+    with pytest.raises(
+        InputError, match=r"at most the top speed of 'robot' by its motion, 0\.105 m/s, found"
+    ):
+        build(load_mission("museum-1", wheels, 0))
+
+
 def test_hits_are_counted_only_where_there_is_room(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("pilotage.maps.memory.available_bytes", lambda: 10**9)
     with pytest.raises(InputError, match=r"stack\.mapper: counting hits in cells: needs about .* GB"):

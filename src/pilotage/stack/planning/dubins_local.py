@@ -53,8 +53,8 @@ class DubinsLocalPlanner:
     def __init__(self, config: DubinsLocalConfig, robot: RobotKnowledge) -> None:
         if config.speed_m_s > robot.motion.top_speed_m_s:
             raise InputError(
-                f"stack.local_planner.speed_m_s: expected at most robot.motion.max_speed_m_s = "
-                f"{robot.motion.top_speed_m_s:g}, found {config.speed_m_s:g}"
+                f"stack.local_planner.speed_m_s: expected at most the top speed of '{robot.name}' by its "
+                f"motion, {robot.motion.top_speed_m_s:g} m/s, found {config.speed_m_s:g}"
             )
         motion = robot.motion
         least_m, turn_rate = motion.least_turning_radius_m, motion.top_turn_rate_rad_s
