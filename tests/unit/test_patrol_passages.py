@@ -92,15 +92,38 @@ def test_who_turns_within_a_corridor_was_in_it_once() -> None:
     graph, passages = row(with_corridor(), (2.0, 2.5), (7.0, 2.5), (12.0, 2.5))
     assert passages.pieces == 2
     through, short = Round.through(graph, np.array([0, 1, 2])), Round.through(graph, np.array([0, 1]))
-    forth, back, taken_m = passages.passed(through)
+    there, back = passages.transits(through)
     # There and back, each through both halves.
-    assert forth.sum(axis=1).tolist() == [2, 0]
-    assert back.sum(axis=1).tolist() == [0, 2]
-    assert taken_m == pytest.approx([6.0, 6.0], abs=1.0)
+    assert there.ways.keys() == {(0, 1), (1, 1)}
+    assert back.ways.keys() == {(0, -1), (1, -1)}
+    assert [once.end_m - once.begin_m for once in (there, back)] == pytest.approx([6.0, 6.0], abs=1.0)
+    ((begin_m, end_m),) = there.against(back)
+    assert (begin_m, end_m) == pytest.approx((there.begin_m, there.end_m), abs=0.5)
+    assert there.against(there) == []
     for walk in (short, Round.through(graph, np.array([1, 0]))):  # also one that begins there
-        forth, back, taken_m = passages.passed(walk)
-        assert forth.sum(axis=1).tolist() == back.sum(axis=1).tolist() == [1]
-        assert taken_m == pytest.approx([6.0], abs=1.0)
+        (once,) = passages.transits(walk)
+        assert once.ways.keys() == {(0, 1), (0, -1)}
+        assert once.end_m - once.begin_m == pytest.approx(6.0, abs=1.0)
+        for way, (since_m, until_m) in once.ways.items():
+            assert once.begin_m - 1e-9 <= since_m <= until_m <= once.end_m + 1e-9, way
+
+
+def test_who_comes_out_of_a_door_into_a_corridor_meets_who_comes_along_it_and_in_at_the_door() -> None:
+    """Of a long passage only the door is shared with who turns in there, not all of it."""
+    walls = [(0.0, 1.1, 3.5, 1.1), (4.5, 1.1, 9.5, 1.1), (10.5, 1.1, 14.0, 1.1), (7.0, 1.1, 7.0, 5.0)]
+    floor = Floor.of(walled(14, 5, *walls), RADIUS_M)
+    places = np.array([[4.0, 3.5], [4.0, 0.55], [10.0, 0.55], [10.0, 3.5]])
+    graph = PatrolGraph.of(places, floor.lengths_m(places, np.eye(4, k=1) + np.eye(4, k=-1) > 0.0))
+    passages = Passages.of(floor, graph, RADIUS_M)
+    out_and_along, back = passages.transits(Round.through(graph, np.array([0, 1, 2, 3])))
+    assert out_and_along.end_m - out_and_along.begin_m == pytest.approx(8.0, abs=1.5)
+    (whole,) = out_and_along.against(back)
+    assert whole == pytest.approx((out_and_along.begin_m, out_and_along.end_m), abs=0.7)
+    # Who comes along the corridor the same way and in at the first door.
+    other = Round.through(graph, np.array([1, 0]))
+    (in_and_out,) = passages.transits(other)
+    parts = out_and_along.against(in_and_out)
+    assert sum(end_m - begin_m for begin_m, end_m in parts) < 2.5
 
 
 def test_waits_by_hand() -> None:
@@ -143,7 +166,7 @@ def test_who_go_round_one_way_wait_for_nobody() -> None:
 def test_who_is_in_a_passage_has_nobody_behind_in_it() -> None:
     graph, passages = row(with_corridor(), (2.0, 2.5), (12.0, 2.5))
     walk, stands = Round.best(graph), Round.through(graph, np.array([0]))
-    ((begin_m, end_m, _), _) = passages.times(walk)
+    (begin_m, end_m, _), _ = passages.transits(walk)
     spare_m = 0.5 * walk.length_m - (end_m - begin_m)
     assert not is_crowded(walk, 2, passages, 0.9 * spare_m)
     assert is_crowded(walk, 2, passages, 1.1 * spare_m)

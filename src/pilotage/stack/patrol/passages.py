@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import scipy
@@ -28,6 +28,34 @@ class Stretch(NamedTuple):
     passage: int
     begin_m: float
     end_m: float
+
+
+Way: TypeAlias = tuple[int, int]
+"""A piece and the direction in which it is come through, 1 or -1."""
+Part: TypeAlias = tuple[float, float]
+"""From where to where along something, in metres."""
+
+
+class Transit(NamedTuple):
+    """Once through a passage on a walk, from where to where along it.
+
+    ``ways`` has the pieces that it comes through, each with its direction, 1 or -1, and from where to where.
+    """
+
+    begin_m: float
+    end_m: float
+    ways: Mapping[Way, Part]
+
+    def against(self, other: Transit) -> list[Part]:
+        """From where to where it comes through what another one comes through the other way, in order."""
+        found: list[Part] = []
+        for begin_m, end_m in sorted(
+            self.ways[piece, way] for piece, way in self.ways if (piece, -way) in other.ways
+        ):
+            if found and begin_m - found[-1][1] < ASIDE_M:
+                begin_m = found.pop()[0]
+            found.append((begin_m, end_m))
+        return found
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,44 +110,42 @@ class Passages:
         """Vertices in a passage, or no farther beside one: who stands there is in the way of all others."""
         return frozenset(a for (a, _), parts in self.stretches.items() if parts[0].begin_m <= beside_m)
 
-    def passed(self, walk: Round) -> tuple[BoolArray, BoolArray, FloatArray]:
-        """Every time that a closed walk comes through a passage.
-
-        Returns
-        -------
-        Which pieces it comes through then one way and which the other way, (K, P) each, and how long that is
-        (K,), in metres.
-        """
-        times = self.times(walk)
-        forth, back = np.zeros((2, len(times), self.pieces), dtype=np.bool_)
-        for row, (*_, ways) in enumerate(times):
-            for piece, way in ways:
-                (forth if way > 0 else back)[row, piece] = True
-        return forth, back, np.array([end_m - begin_m for begin_m, end_m, _ in times])
-
-    def times(self, walk: Round) -> list[tuple[float, float, set[tuple[int, int]]]]:
-        """The same: from where to where along the walk, and which pieces in which direction, 1 or -1."""
-        times: list[tuple[int, float, float, set[tuple[int, int]]]] = []
+    def transits(self, walk: Round) -> list[Transit]:
+        """Every time that a closed walk comes through a passage."""
+        found: list[tuple[int, Transit]] = []
         for k, here in enumerate(walk.stops.tolist()):
             there = int(walk.stops[(k + 1) % len(walk.stops)])
             for piece, number, begin_m, end_m in self.stretches.get((here, there), ()):
-                begin_m, end_m = walk.at_m[k] + begin_m, walk.at_m[k] + end_m
-                way = piece, 1 if here < there else -1
-                if times and times[-1][0] == number and begin_m - times[-1][2] < ASIDE_M:
-                    _, since_m, _, ways = times[-1]
-                    times[-1] = number, since_m, end_m, ways | {way}
+                along_m = walk.at_m[k] + begin_m, walk.at_m[k] + end_m
+                once = Transit(*along_m, {(piece, 1 if here < there else -1): along_m})
+                if found and found[-1][0] == number and once.begin_m - found[-1][1].end_m < ASIDE_M:
+                    found[-1] = number, _joined(found[-1][1], once)
                 else:
-                    times.append((number, begin_m, end_m, {way}))
-        if len(times) > 1 and times[0][0] == times[-1][0]:
-            number, since_m, _, ways = times[-1]
-            if times[0][1] + walk.length_m - times[-1][2] < ASIDE_M:  # the walk begins within it
-                times[0] = number, since_m - walk.length_m, times[0][2], ways | times[0][3]
-                times.pop()
-        return [(begin_m, end_m, ways) for _, begin_m, end_m, ways in times]
+                    found.append((number, once))
+        if len(found) > 1 and found[0][0] == found[-1][0]:
+            last = _earlier(found[-1][1], walk.length_m)
+            if found[0][1].begin_m - last.end_m < ASIDE_M:  # the walk begins within it
+                found[0] = found[0][0], _joined(last, found[0][1])
+                found.pop()
+        return [transit for _, transit in found]
 
 
 OPEN = Passages()
 """Two can meet everywhere."""
+
+
+def _joined(one: Transit, next_one: Transit) -> Transit:
+    """Two that follow each other as one; a piece come through twice one way reaches from first to last."""
+    ways = dict(one.ways)
+    for way, (begin_m, end_m) in next_one.ways.items():
+        ways[way] = ways.get(way, (begin_m, end_m))[0], end_m
+    return Transit(one.begin_m, next_one.end_m, ways)
+
+
+def _earlier(transit: Transit, by_m: float) -> Transit:
+    """The same one time around before."""
+    ways = {way: (begin_m - by_m, end_m - by_m) for way, (begin_m, end_m) in transit.ways.items()}
+    return Transit(transit.begin_m - by_m, transit.end_m - by_m, ways)
 
 
 def narrow_cells(floor: Floor, half_m: float) -> BoolArray:
