@@ -46,7 +46,8 @@ from pilotage.stack.navigator.navigator import Parts
 from pilotage.stack.planning.dubins_local import DubinsLocalConfig, DubinsLocalPlanner
 from pilotage.stack.planning.hybrid_astar import HybridAstarConfig, HybridAstarPlanner
 from pilotage.stack.planning.local_planner import RouteAhead
-from pilotage.stack.planning.planner import Path, Planner, PlanRequest, PlanStatus
+from pilotage.stack.planning.plan_status import PlanStatus
+from pilotage.stack.planning.planner import Path, Planner, PlanRequest
 from pilotage.stack.planning.rrt_star_dubins import RrtStarDubinsConfig, RrtStarDubinsPlanner
 from support import worlds
 from support.robots import ROOM, sensors, told_of

@@ -45,7 +45,8 @@ from pilotage.stack.planning.grid_path import GridPath
 from pilotage.stack.planning.grid_planner import GRID_PLANNERS, GridRequest, GridResult
 from pilotage.stack.planning.grid_space import GridSpace
 from pilotage.stack.planning.local_planner import LOCAL_PLANNERS, LocalPath
-from pilotage.stack.planning.planner import PLANNERS, SMOOTHERS, Path, PlanRequest, PlanResult, PlanStatus
+from pilotage.stack.planning.plan_status import PlanStatus
+from pilotage.stack.planning.planner import PLANNERS, SMOOTHERS, Path, PlanRequest, PlanResult
 from support.warm_commands import pilotage
 
 NAN = math.nan
@@ -442,7 +443,8 @@ PLANNER = """
 from pilotage.core.config import Config
 from pilotage.evaluation.metric import Metric
 from pilotage.evaluation.metrics import METRICS
-from pilotage.stack.planning.planner import PLANNERS, Path, PlanResult, PlanStatus
+from pilotage.stack.planning.plan_status import PlanStatus
+from pilotage.stack.planning.planner import PLANNERS, Path, PlanResult
 class Mine(Config):
     "Nothing."
 @PLANNERS.add("somebodys", Mine)

@@ -21,7 +21,8 @@ from pilotage.maps.occupancy_grid import OccupancyGrid
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.maps.world_map import WorldMap
 from pilotage.stack.planning.driving_space import space_for
-from pilotage.stack.planning.planner import PlanRequest, PlanStatus
+from pilotage.stack.planning.plan_status import PlanStatus
+from pilotage.stack.planning.planner import PlanRequest
 from pilotage.stack.planning.rrt_star_dubins import RrtStarDubinsConfig, RrtStarDubinsPlanner
 
 CELLS_M = 0.05

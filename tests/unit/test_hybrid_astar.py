@@ -20,7 +20,7 @@ from pilotage.maps.segment_map import SegmentMap
 from pilotage.models.footprint import Footprint
 from pilotage.stack.planning.hybrid_astar import HybridAstarConfig, HybridAstarPlanner
 from pilotage.stack.planning.outline import car_of, ground_of
-from pilotage.stack.planning.planner import PlanStatus
+from pilotage.stack.planning.plan_status import PlanStatus
 from support.yards import BAY, CAR, TURNING_M, YARDS, check_car_path, gears, least_clearance_m, request, yard
 
 

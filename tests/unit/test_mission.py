@@ -158,7 +158,7 @@ def test_a_new_name_drops_the_old_ones_parameters() -> None:
         ("run.dt_s=0", "greater than or equal to 0.0001"),
         ("world.obstacles.9.thickness_m=1", "index from 0 to 1"),
         ("stack.localizer.gate=1.5", "less than 1"),
-        ("stack.local_planner.speed_m_s=5", "max_speed_m_s"),
+        ("stack.local_planner.speed_m_s=5", "top speed of 'robot'"),
         (
             "world.obstacles.0.from_m=[1e308, 4]",
             "from_m.0: expected 0 or a number from 1e-100",

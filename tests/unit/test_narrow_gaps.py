@@ -9,7 +9,8 @@ from pilotage.core.types import Goal, Pose2
 from pilotage.kernels.geometry import plane
 from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.segment_map import SegmentMap
-from pilotage.stack.planning.planner import PLANNERS, PlanRequest, PlanResult, PlanStatus
+from pilotage.stack.planning.plan_status import PlanStatus
+from pilotage.stack.planning.planner import PLANNERS, PlanRequest, PlanResult
 
 CLEARANCE_M = 0.30
 START, GOAL = Pose2(2.0, 4.0, 0.0), Goal(8.0, 4.0)

@@ -15,7 +15,8 @@ from pilotage.models.motion.differential_drive import DifferentialDriveConfig
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.navigator.global_plan import GlobalPlan
-from pilotage.stack.planning.planner import Path, PlanRequest, PlanResult, PlanStatus
+from pilotage.stack.planning.plan_status import PlanStatus
+from pilotage.stack.planning.planner import Path, PlanRequest, PlanResult
 from support.yards import CAR, TURNING_M
 
 

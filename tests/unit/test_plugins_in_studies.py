@@ -18,7 +18,8 @@ from support.warm_commands import pilotage
 ODD = """
 import sys
 from pilotage.core.config import Config
-from pilotage.stack.planning.planner import PLANNERS, PlanResult, PlanStatus
+from pilotage.stack.planning.plan_status import PlanStatus
+from pilotage.stack.planning.planner import PLANNERS, PlanResult
 class Mine(Config):
     "What it does."
     how: str = "print"

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 from pilotage.core.errors import InputError
 from pilotage.maps.segment_map import SegmentMap
-from pilotage.stack.planning.planner import PlanResult, PlanStatus
+from pilotage.stack.planning.plan_status import PlanStatus
+from pilotage.stack.planning.planner import PlanResult
 from pilotage.stack.planning.route import RouteConfig, RoutePlanner
 from support.planning_worlds import MUSEUM, check_drivable, request
 

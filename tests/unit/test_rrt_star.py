@@ -19,7 +19,8 @@ from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.occupancy_grid import FREE, OCCUPIED, OccupancyGrid
 from pilotage.maps.world_map import WorldMap
 from pilotage.stack.planning.driving_space import blocked_end, space_for
-from pilotage.stack.planning.planner import PlanRequest, PlanResult, PlanStatus
+from pilotage.stack.planning.plan_status import PlanStatus
+from pilotage.stack.planning.planner import PlanRequest, PlanResult
 from pilotage.stack.planning.rrt_star_dubins import RrtStarDubinsConfig, RrtStarDubinsPlanner
 from support.planning_worlds import (
     CLEARANCE_M,

@@ -23,7 +23,8 @@ from pilotage.kernels.rrt.steering import (
 )
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.stack.planning.outline import car_of, ground_of
-from pilotage.stack.planning.planner import PLANNERS, SMOOTHERS, PlanRequest, PlanResult, PlanStatus
+from pilotage.stack.planning.plan_status import PlanStatus
+from pilotage.stack.planning.planner import PLANNERS, SMOOTHERS, PlanRequest, PlanResult
 from pilotage.stack.planning.rough_path import NO_BOUND, NO_GUIDE
 from support.yards import (
     BAY,

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from pilotage.core.errors import InputError
+from pilotage.core.shown import visible
 from pilotage.evaluation.courses import CourseRun, summarize_courses
 from pilotage.experiments.barn_benchmark import course_base, led_by
 from pilotage.experiments.barn_files import REPLAYS, SUMMARY, finite
@@ -157,7 +158,7 @@ def course_run_mission(
         Where the controller or an override is not what it should be.
     """
     draw = np.random.default_rng([request.seed, course.number, trial, *os.fsencode(course.family)])
-    name = Path(course.family).stem if course.family not in DRAWN else course.family
+    name = visible(Path(course.family).stem) if course.family not in DRAWN else course.family
     settings: dict[str, Any] = {
         "mission": f"{name}-{course.number}-{trial}-{controller}"[-100:],
         "run.seed": int(draw.integers(0, 2**62)),

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from pilotage.core.whole_file import draft_of, write_whole
+from pilotage.records.reading import clean_text
 
 CSV, DATABASE, TABLE = "runs.csv", "runs.sqlite", "runs"
 Cell = str | int | float
@@ -17,7 +18,7 @@ Cell = str | int | float
 
 def write_rows(folder: Path, columns: Sequence[str], rows: Sequence[Sequence[Cell]]) -> None:
     """Write ``runs.csv`` and ``runs.sqlite``; a number that is none is empty, and NULL."""
-    plain = [[None if isinstance(v, float) and not math.isfinite(v) else v for v in row] for row in rows]
+    plain = [[_plain(value) for value in row] for row in rows]
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)
@@ -32,3 +33,10 @@ def write_rows(folder: Path, columns: Sequence[str], rows: Sequence[Sequence[Cel
             base.commit()
         finally:
             base.close()
+
+
+def _plain(value: Cell) -> Cell | None:
+    """As both take it: names of files need be no text."""
+    if isinstance(value, str):
+        return clean_text(value)
+    return None if isinstance(value, float) and not math.isfinite(value) else value

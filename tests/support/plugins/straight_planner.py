@@ -9,7 +9,8 @@ import numpy as np
 
 from pilotage.core.config import Config
 from pilotage.sensors.sensor import Positive
-from pilotage.stack.planning.planner import PLANNERS, Path, PlanRequest, PlanResult, PlanStatus
+from pilotage.stack.planning.plan_status import PlanStatus
+from pilotage.stack.planning.planner import PLANNERS, Path, PlanRequest, PlanResult
 
 
 class StraightConfig(Config):

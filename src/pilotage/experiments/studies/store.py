@@ -38,6 +38,8 @@ from pilotage.experiments.studies.study import Study, changes_told
 from pilotage.experiments.studies.trial import Outcome, Task
 from pilotage.records.folder import STUDY_FILE
 
+HEADER_BYTES = 100
+"""Of a database of SQLite's."""
 MAX_ATTEMPTS = 2
 """A trial that broke, and not by its mission's fault, is tried once more."""
 FULL_PAUSE_S = 2.0
@@ -85,8 +87,9 @@ class Store:
         if self.path.is_symlink() or self.path.exists():
             require_file(self.path, "a study's database")
         if self.path.is_file():
-            if self.path.stat().st_size == 0 and (folder / STUDY_FILE).is_file():
-                raise CorruptDatabaseError(self.path, "the file is empty")
+            # SQLite takes such a file for a new database.
+            if self.path.stat().st_size < HEADER_BYTES and (folder / STUDY_FILE).is_file():
+                raise CorruptDatabaseError(self.path, "the file is empty, or cut off in its header")
             check_sound(self.path)
         else:
             put_in_place(self.path, lambda database: _fill(database, study))

@@ -24,12 +24,12 @@ from pilotage.stack.navigator.detours import AS_FAR_AS_IT_TAKES, Detours
 from pilotage.stack.navigator.doubtful_gap import doubtful_gap, is_tight
 from pilotage.stack.navigator.progress import PathProgress
 from pilotage.stack.planning.outline import car_of, ground_of
+from pilotage.stack.planning.plan_status import PlanStatus
 from pilotage.stack.planning.planner import (
     Path,
     Planner,
     PlanRequest,
     PlanResult,
-    PlanStatus,
     Smoother,
     outline_clearance_m,
 )

@@ -36,7 +36,8 @@ from pilotage.stack.navigator.timed_path import laid_out, with_turns
 from pilotage.stack.navigator.trail import Trail
 from pilotage.stack.navigator.yielding import Act, Yielding, YieldingConfig
 from pilotage.stack.planning.outline import car_of, ground_of
-from pilotage.stack.planning.planner import Path, PlanResult, PlanStatus
+from pilotage.stack.planning.plan_status import PlanStatus
+from pilotage.stack.planning.planner import Path, PlanResult
 
 MOST_REPLANS, MOST_RESTS = 8, 3
 """How often it plans anew where it went astray, and for what a path that covers a floor left of it."""

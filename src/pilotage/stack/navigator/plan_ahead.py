@@ -21,7 +21,8 @@ from pilotage.stack.navigator.global_plan import GlobalPlan
 from pilotage.stack.navigator.own_map import OwnMap
 from pilotage.stack.navigator.progress import StallWatch, patience_s
 from pilotage.stack.perception.moving_bodies import MovingBodies
-from pilotage.stack.planning.planner import Planner, PlanStatus, Smoother
+from pilotage.stack.planning.plan_status import PlanStatus
+from pilotage.stack.planning.planner import Planner, Smoother
 
 
 class PlanAheadConfig(Config):

@@ -17,7 +17,8 @@ from pilotage.sensors.sensor import Positive
 from pilotage.stack.planning.driving_space import clearance_of, failure
 from pilotage.stack.planning.field_search import path_of_line
 from pilotage.stack.planning.node_search import line_length_m
-from pilotage.stack.planning.planner import PLANNERS, PlanRequest, PlanResult, PlanStatus
+from pilotage.stack.planning.plan_status import PlanStatus
+from pilotage.stack.planning.planner import PLANNERS, PlanRequest, PlanResult
 from pilotage.stack.planning.sweep_changes import reshaped
 from pilotage.stack.planning.sweep_detours import completed, joined
 from pilotage.stack.planning.sweep_floor import Sought, covered, in_cells_of, rest_of, whole_floor

@@ -10,7 +10,8 @@ from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
 from pilotage.kernels.rrt.clearance import Space, first_blocked, make_space, slack_at
 from pilotage.maps.distance_field import DistanceField
-from pilotage.stack.planning.planner import Path, PlanRequest, PlanResult, PlanStatus
+from pilotage.stack.planning.plan_status import PlanStatus
+from pilotage.stack.planning.planner import Path, PlanRequest, PlanResult
 
 STATE_SPACING_M = 0.05
 """Spacing of the states of a path."""

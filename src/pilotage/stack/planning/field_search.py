@@ -24,7 +24,8 @@ from pilotage.stack.planning.driving_space import (
 from pilotage.stack.planning.grid_space import Cell, GridPath, GridSpace
 from pilotage.stack.planning.narrow_gaps import line_through_gaps
 from pilotage.stack.planning.node_search import NodeSearch, line_length_m, line_states
-from pilotage.stack.planning.planner import Path, PlanRequest, PlanResult, PlanStatus
+from pilotage.stack.planning.plan_status import PlanStatus
+from pilotage.stack.planning.planner import Path, PlanRequest, PlanResult
 
 FINE_SHARE, MOST_FINE_NODES = 0.5, 1_000_000
 """Of the clearance are nodes apart for robots that are small beside the field's own; of a large map more."""

@@ -10,7 +10,7 @@ from pilotage.core.checked import Gives
 from pilotage.core.misfit import misfit
 from pilotage.core.registry import Registry
 from pilotage.stack.planning.grid_space import Cell, GridPath, GridSpace
-from pilotage.stack.planning.planner import PlanStatus
+from pilotage.stack.planning.plan_status import PlanStatus
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,8 @@ from pilotage.core.config import Config
 from pilotage.stack.planning.field_search import plan_over_nodes
 from pilotage.stack.planning.grid_planner import GRID_PLANNERS, GridRequest, GridResult
 from pilotage.stack.planning.grid_space import Cell, GridPath, GridSpace, Search
-from pilotage.stack.planning.planner import PLANNERS, PlanRequest, PlanResult, PlanStatus
+from pilotage.stack.planning.plan_status import PlanStatus
+from pilotage.stack.planning.planner import PLANNERS, PlanRequest, PlanResult
 
 Find: TypeAlias = Callable[[GridSpace, Cell, Cell, bool], GridPath | None]
 

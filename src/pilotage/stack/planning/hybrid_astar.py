@@ -17,7 +17,8 @@ from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.planning.driving_space import SPARE, failure, spaced_waypoints
 from pilotage.stack.planning.hybrid_query import STEP_CELLS, Found, Grain, HybridQuery
 from pilotage.stack.planning.outline import blocked_pose, car_of, goal_pose, ground_of, shut_for
-from pilotage.stack.planning.planner import PLANNERS, Path, PlanRequest, PlanResult, PlanStatus
+from pilotage.stack.planning.plan_status import PlanStatus
+from pilotage.stack.planning.planner import PLANNERS, Path, PlanRequest, PlanResult
 from pilotage.stack.planning.rough_path import look_around
 
 LEAST_RADIUS_M = 0.3

@@ -13,7 +13,8 @@ from pilotage.kernels.rrt.clearance import Space
 from pilotage.maps.distance_field import DistanceField
 from pilotage.models.footprint import Footprint
 from pilotage.stack.planning.driving_space import space_for
-from pilotage.stack.planning.planner import PlanRequest, PlanStatus
+from pilotage.stack.planning.plan_status import PlanStatus
+from pilotage.stack.planning.planner import PlanRequest
 
 STATE_SPACING_M = 0.025
 """Of the states of a path for an outline."""

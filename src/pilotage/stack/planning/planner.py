@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from enum import StrEnum
 from typing import Protocol
 
 import numpy as np
@@ -18,6 +17,8 @@ from pilotage.core.registry import Registry
 from pilotage.core.types import FloatArray, Goal, Pose2
 from pilotage.maps.distance_field import DistanceField
 from pilotage.models.footprint import Footprint
+from pilotage.stack.planning.grid_planner import unfit_cells
+from pilotage.stack.planning.plan_status import PlanStatus
 
 SPACING_M = 0.05
 """Between the states of a path, at most."""
@@ -67,15 +68,6 @@ class Path:
         if last_heading_rad is not None:
             states[-1, 2] = last_heading_rad
         return Path(states, states[np.append(0, ends)], float(lengths.sum()), 0.0)
-
-
-class PlanStatus(StrEnum):
-    """How a planning query ended."""
-
-    FOUND = "found"
-    NO_PATH = "no path"
-    START_BLOCKED = "start blocked"
-    GOAL_BLOCKED = "goal blocked"
 
 
 @dataclass(frozen=True, slots=True)
@@ -243,12 +235,6 @@ def _unfit_arrays(path: Path) -> str:
     return next((f"{name} {value}" for name, value in lengths if value < 0.0), "")
 
 
-def _unfit_cells(given: object, planner: Planner, request: object) -> str:
-    from pilotage.stack.planning.grid_planner import unfit_cells  # where planners are known already
-
-    return unfit_cells(given, planner, request)
-
-
 def _unfit_kept(planner: Planner) -> str:
     clearance_m = kept(planner, "clearance_m")
     wrong = unfit_number(clearance_m) or ("" if clearance_m >= 0.0 else str(clearance_m))
@@ -261,7 +247,7 @@ PLANNERS: Registry[Planner] = Registry(
     gives=(
         keeps("a clearance_m of 0 or more", _unfit_kept),
         Gives("plan", "a PlanResult with a path to drive", _unfit_plan),
-        Gives("search", "a GridResult with a path over free cells", _unfit_cells, optional=True),
+        Gives("search", "a GridResult with a path over free cells", unfit_cells, optional=True),
     ),
 )
 SMOOTHERS: Registry[Smoother] = Registry(

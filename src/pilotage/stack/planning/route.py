@@ -26,7 +26,8 @@ from pilotage.stack.planning.driving_space import (
     space_for,
     spaced_waypoints,
 )
-from pilotage.stack.planning.planner import PLANNERS, Path, PlanRequest, PlanResult, PlanStatus
+from pilotage.stack.planning.plan_status import PlanStatus
+from pilotage.stack.planning.planner import PLANNERS, Path, PlanRequest, PlanResult
 
 
 class RouteConfig(Config):

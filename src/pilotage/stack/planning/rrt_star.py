@@ -15,7 +15,8 @@ from pilotage.core.types import FloatArray
 from pilotage.kernels.rrt import samples as rrt_samples
 from pilotage.kernels.rrt import tree as rrt_tree
 from pilotage.stack.planning.driving_space import STATE_SPACING_M
-from pilotage.stack.planning.planner import Path, PlanResult, PlanStatus
+from pilotage.stack.planning.plan_status import PlanStatus
+from pilotage.stack.planning.planner import Path, PlanResult
 
 MAX_TREE_NODES = 500_000
 """A full tree ends the search: this many nodes take 80 MB."""

@@ -27,13 +27,8 @@ from pilotage.stack.planning.driving_space import (
     space_for,
     usual_radius_m,
 )
-from pilotage.stack.planning.planner import (
-    PLANNERS,
-    Path,
-    PlanRequest,
-    PlanResult,
-    PlanStatus,
-)
+from pilotage.stack.planning.plan_status import PlanStatus
+from pilotage.stack.planning.planner import PLANNERS, Path, PlanRequest, PlanResult
 from pilotage.stack.planning.rough_path import Around, look_around
 from pilotage.stack.planning.rrt_star import MAX_TREE_NODES, RrtStarConfig, directly
 from pilotage.stack.planning.rrt_star import search as grown

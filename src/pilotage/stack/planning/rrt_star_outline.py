@@ -30,7 +30,8 @@ from pilotage.stack.planning.outline import (
     skin_m,
     word_states,
 )
-from pilotage.stack.planning.planner import Path, PlanRequest, PlanResult, PlanStatus
+from pilotage.stack.planning.plan_status import PlanStatus
+from pilotage.stack.planning.planner import Path, PlanRequest, PlanResult
 from pilotage.stack.planning.rough_path import look_around
 from pilotage.stack.planning.rrt_star import MAX_TREE_NODES, RrtStarConfig, directly, search
 

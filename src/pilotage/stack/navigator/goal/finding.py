@@ -13,7 +13,7 @@ from pilotage.stack.navigator.goal.ended import fail
 from pilotage.stack.navigator.goal.state import Move, State
 from pilotage.stack.navigator.goal_config import Mode
 from pilotage.stack.navigator.navigator import DISC_HINT
-from pilotage.stack.planning.planner import PlanStatus
+from pilotage.stack.planning.plan_status import PlanStatus
 
 PLAN_AGAIN_S = 1.0
 """A robot that found itself where no plan begins drives on for this long before the next."""
