@@ -53,8 +53,8 @@ def test_trials_of_odd_plugins(tmp_path: Path) -> None:
     with (tmp_path / "studies/odd/trials.csv").open(newline="") as file:
         rows = {row["factor.how"]: row for row in csv.DictReader(file)}
     assert rows["print"]["status"] == "done"
-    assert rows["exit"]["reason"] == f"plugin '{tmp_path / 'odd.py'}' line 16: SystemExit: 3"
-    assert rows["raise"]["reason"] == f"plugin '{tmp_path / 'odd.py'}' line 18: ValueError: no, thank you"
+    assert rows["exit"]["reason"] == f"plugin '{tmp_path / 'odd.py'}' line 17: SystemExit: 3"
+    assert rows["raise"]["reason"] == f"plugin '{tmp_path / 'odd.py'}' line 19: ValueError: no, thank you"
 
 
 def test_a_pools_worker_says_where_a_plugin_failed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
