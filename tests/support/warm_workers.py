@@ -3,7 +3,7 @@
 A spawned worker imports for two seconds of processor time what the last one imported. Here one server does it
 once and each worker is forked from it; all else is as in a spawned one: the environment of who starts it,
 its working folder, signals, limits and how it ends. Commands that tests start in processes of their own spawn
-their workers, as they do for users (``test_studies_signals``, ``test_run_pool``, ``test_checked_plugins``,
+their workers, as they do for users (``test_studies_signals``, ``test_run_pool``, ``test_installed_plugins``,
 ``test_ten_minutes``, ``test_face_as_written``).
 """
 
