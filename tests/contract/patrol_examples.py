@@ -22,7 +22,15 @@ STRATEGY_NUMBERS: dict[str, frozenset[str]] = {
     **dict.fromkeys(("greedy-bayesian", "sebs"), frozenset({"probability_at_zero"})),
     **dict.fromkeys(("cbls", "dtag", "dtap"), frozenset()),
     "adaptive-rounds": frozenset(
-        {"by_chance", "mean_weight", "most_slack", "sharing_cost", "deaf_cost", "slack"}
+        {
+            "by_chance",
+            "mean_weight",
+            "most_slack",
+            "sharing_cost",
+            "forecast_mean_weight",
+            "late_ratio",
+            "slack",
+        }
     ),
 }
 """Every strategy, with its parameters that are pure numbers."""

@@ -149,6 +149,7 @@ def _shares(
             passages=passages,
             starts_m=site.starts_m.copy(),  # nobody's strategy has any business in another's setting
             turn_m=site.turn_m,
+            visit_m=site.visit_m,
             talks=talks,
         )
         strategy = build_component(STRATEGIES, mission.team.strategy, "strategy", setting)

@@ -68,6 +68,45 @@ def relation(line: FloatArray, other: FloatArray, near_m: float, across: float, 
 
 
 @kernel
+def overlap(
+    line: FloatArray, other: FloatArray, near_m: float, across: float
+) -> tuple[int, float, float, float, float]:
+    """TOGETHER or AGAINST, from where to where lines lie on each other; APART if they do not, or cross.
+
+    Parameters
+    ----------
+    line, other, near_m, across
+        As ``relation``; a line of one place is against nobody.
+
+    Returns
+    -------
+    relation, begin, end, their_begin, their_end
+        As shares of the places of either line.
+    """
+    ours, theirs = line.shape[0], other.shape[0]
+    begin, end, their_begin, their_end, count, agree = ours, -1, theirs, -1, 0, 0.0
+    if min(ours, theirs) < 2:
+        return APART, 0.0, 0.0, 0.0, 0.0
+    for i in range(ours):
+        for j in range(theirs):
+            if math.hypot(line[i, 0] - other[j, 0], line[i, 1] - other[j, 1]) < near_m:
+                begin, end = min(begin, i), max(end, i)
+                their_begin, their_end = min(their_begin, j), max(their_end, j)
+                (ax, ay), (bx, by) = heading(line, i), heading(other, j)
+                agree += ax * bx + ay * by
+                count += 1
+    if count == 0 or abs(agree) < across * count:
+        return APART, 0.0, 0.0, 0.0, 0.0
+    return (
+        TOGETHER if agree > 0.0 else AGAINST,
+        begin / (ours - 1),
+        end / (ours - 1),
+        their_begin / (theirs - 1),
+        their_end / (theirs - 1),
+    )
+
+
+@kernel
 def first_narrow(way: FloatArray, width: float, ahead: int, between: int) -> tuple[int, int]:
     """The first and the last place of the first part of a path (N, 3) whose third column is below ``width``.
 

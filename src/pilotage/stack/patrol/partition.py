@@ -47,16 +47,6 @@ class Plan:
     worst_m: float
     mean_m: float
 
-    def expected_m(self, vertices: int, sharing_cost: float) -> tuple[float, float]:
-        """Worst and mean distance where robots that share a round do not quite keep apart.
-
-        Parameters
-        ----------
-        sharing_cost
-            What the worst of such a round grows by, as a share of it; its mean grows by half of that.
-        """
-        return _promised(self.rounds, self.sizes, vertices, sharing_cost)
-
 
 def even_sizes(robots: int, groups: int) -> tuple[int, ...]:
     """Robots in groups, larger ones first."""
@@ -95,7 +85,7 @@ def annealed(
     mean_weight
         What the mean distance counts beside the worst.
     sharing_cost
-        As ``Plan.expected_m``.
+        What the worst of a walk that several robots share counts more, as a share; its mean half of that.
     turn_m
         What turning back at a place costs, as a distance.
     """
@@ -148,22 +138,15 @@ def _shares(graph: PatrolGraph, sizes: tuple[int, ...]) -> tuple[frozenset[int],
 
 
 def _plan(graph: PatrolGraph, walks: Sequence[Round], sizes: tuple[int, ...]) -> Plan:
-    return Plan(tuple(walks), sizes, *_promised(tuple(walks), sizes, len(graph), 0.0))
+    worst, mean = np.empty((len(walks), len(graph))), np.empty((len(walks), len(graph)))
+    for group, walk in enumerate(walks):
+        visit_gaps(walk.stops, walk.at_m, walk.length_m, sizes[group], worst[group], mean[group])
+    return Plan(tuple(walks), sizes, *map(float, promised(worst, mean, np.array(sizes), 0.0)))
 
 
 def _near(graph: PatrolGraph) -> IntArray:
     """(V, K) the vertices that are nearest to each."""
     return np.argsort(graph.shortest_m, axis=1, kind="stable")[:, 1 : 1 + NEIGHBOURS]
-
-
-def _promised(
-    rounds: Sequence[Round], sizes: tuple[int, ...], vertices: int, sharing_cost: float
-) -> tuple[float, float]:
-    worst, mean = np.empty((len(rounds), vertices)), np.empty((len(rounds), vertices))
-    for group, walk in enumerate(rounds):
-        visit_gaps(walk.stops, walk.at_m, walk.length_m, sizes[group], worst[group], mean[group])
-    most_m, usual_m = promised(worst, mean, np.array(sizes), sharing_cost)
-    return float(most_m), float(usual_m)
 
 
 def _cut(graph: PatrolGraph, order: IntArray, sizes: tuple[int, ...]) -> list[set[int]]:

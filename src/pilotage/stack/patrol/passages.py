@@ -5,20 +5,23 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 import scipy
 
 from pilotage.core.types import BoolArray, FloatArray, IntArray
+from pilotage.kernels.patrol import along
 from pilotage.maps.floor import Floor
 from pilotage.stack.patrol.graph import PatrolGraph
-from pilotage.stack.patrol.tours import Round
 
 BESIDE_M = 0.13
 """What two abreast keep from each other and from walls, in all, to each side of the middle."""
 ASIDE_M = 1.5
 """Between two narrow parts that are nearer to each other nobody stands aside: they are passed at once."""
+SAME_M, ACROSS, LINE_M = 0.6, 0.3, 0.25
+"""Two paths this near to each other are at one place, and cross where their headings agree by less, either
+way; they are compared at places so far apart."""
 
 
 class Stretch(NamedTuple):
@@ -30,32 +33,14 @@ class Stretch(NamedTuple):
     end_m: float
 
 
-Way: TypeAlias = tuple[int, int]
-"""A piece and the direction in which it is come through, 1 or -1."""
-Part: TypeAlias = tuple[float, float]
-"""From where to where along something, in metres."""
+class Overlap(NamedTuple):
+    """Another piece that lies on one: which, 1 or -1 as both lead the same way or against each other, and
+    from which share of the one's length to which."""
 
-
-class Transit(NamedTuple):
-    """Once through a passage on a walk, from where to where along it.
-
-    ``ways`` has the pieces that it comes through, each with its direction, 1 or -1, and from where to where.
-    """
-
-    begin_m: float
-    end_m: float
-    ways: Mapping[Way, Part]
-
-    def against(self, other: Transit) -> list[Part]:
-        """From where to where it comes through what another one comes through the other way, in order."""
-        found: list[Part] = []
-        for begin_m, end_m in sorted(
-            self.ways[piece, way] for piece, way in self.ways if (piece, -way) in other.ways
-        ):
-            if found and begin_m - found[-1][1] < ASIDE_M:
-                begin_m = found.pop()[0]
-            found.append((begin_m, end_m))
-        return found
+    piece: int
+    sign: int
+    begin: float
+    end: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,10 +53,13 @@ class Passages:
         Of the edge from one vertex to another, in order; an edge that has none is left out.
     pieces
         How many there are.
+    overlaps
+        Of each piece that others lie on.
     """
 
     stretches: Mapping[tuple[int, int], tuple[Stretch, ...]] = field(default_factory=dict)
     pieces: int = 0
+    overlaps: Mapping[int, tuple[Overlap, ...]] = field(default_factory=dict)
 
     @staticmethod
     def of(floor: Floor, graph: PatrolGraph, radius_m: float) -> Passages:
@@ -86,7 +74,7 @@ class Passages:
         label, _ = scipy.ndimage.label(narrow, structure=np.ones((3, 3)))
         passage = label.astype(np.int64)
         found: dict[tuple[int, int], tuple[Stretch, ...]] = {}
-        pieces = 0
+        lines: list[FloatArray] = []
         for a in range(len(graph)):
             after = graph.neighbours(a)
             if not (after > a).any():
@@ -98,54 +86,21 @@ class Passages:
                 parts = _parts(corners, length_m, passage, floor)
                 if not parts:
                     continue
-                found[a, b] = tuple(Stretch(pieces + k, *part) for k, part in enumerate(parts))
+                found[a, b] = tuple(Stretch(len(lines) + k, *part) for k, (part, _) in enumerate(parts))
                 found[b, a] = tuple(
                     Stretch(piece, number, length_m - end_m, length_m - begin_m)
                     for piece, number, begin_m, end_m in found[a, b][::-1]
                 )
-                pieces += len(parts)
-        return Passages(found, pieces)
+                lines += [line for _, line in parts]
+        return Passages(found, len(lines), _overlaps(lines))
 
     def vertices_in(self, beside_m: float) -> frozenset[int]:
         """Vertices in a passage, or no farther beside one: who stands there is in the way of all others."""
         return frozenset(a for (a, _), parts in self.stretches.items() if parts[0].begin_m <= beside_m)
 
-    def transits(self, walk: Round) -> list[Transit]:
-        """Every time that a closed walk comes through a passage."""
-        found: list[tuple[int, Transit]] = []
-        for k, here in enumerate(walk.stops.tolist()):
-            there = int(walk.stops[(k + 1) % len(walk.stops)])
-            for piece, number, begin_m, end_m in self.stretches.get((here, there), ()):
-                along_m = walk.at_m[k] + begin_m, walk.at_m[k] + end_m
-                once = Transit(*along_m, {(piece, 1 if here < there else -1): along_m})
-                if found and found[-1][0] == number and once.begin_m - found[-1][1].end_m < ASIDE_M:
-                    found[-1] = number, _joined(found[-1][1], once)
-                else:
-                    found.append((number, once))
-        if len(found) > 1 and found[0][0] == found[-1][0]:
-            last = _earlier(found[-1][1], walk.length_m)
-            if found[0][1].begin_m - last.end_m < ASIDE_M:  # the walk begins within it
-                found[0] = found[0][0], _joined(last, found[0][1])
-                found.pop()
-        return [transit for _, transit in found]
-
 
 OPEN = Passages()
 """Two can meet everywhere."""
-
-
-def _joined(one: Transit, next_one: Transit) -> Transit:
-    """Two that follow each other as one; a piece come through twice one way reaches from first to last."""
-    ways = dict(one.ways)
-    for way, (begin_m, end_m) in next_one.ways.items():
-        ways[way] = ways.get(way, (begin_m, end_m))[0], end_m
-    return Transit(one.begin_m, next_one.end_m, ways)
-
-
-def _earlier(transit: Transit, by_m: float) -> Transit:
-    """The same one time around before."""
-    ways = {way: (begin_m - by_m, end_m - by_m) for way, (begin_m, end_m) in transit.ways.items()}
-    return Transit(transit.begin_m - by_m, transit.end_m - by_m, ways)
 
 
 def narrow_cells(floor: Floor, half_m: float) -> BoolArray:
@@ -171,8 +126,8 @@ def narrow_cells(floor: Floor, half_m: float) -> BoolArray:
 
 def _parts(
     corners_xy_m: FloatArray, length_m: float, passage: IntArray, floor: Floor
-) -> list[tuple[int, float, float]]:
-    """Number of the passage, beginning and end of what a path (K, 2) of some length leads through."""
+) -> list[tuple[tuple[int, float, float], FloatArray]]:
+    """Of a path (K, 2) of some length what it leads through: number of the passage, begin, end; its line."""
     legs_m = np.hypot(*np.diff(corners_xy_m, axis=0).T)
     along_m = np.concatenate([[0.0], np.cumsum(legs_m)])
     if along_m[-1] <= 0.0:
@@ -180,12 +135,33 @@ def _parts(
     at_m = np.linspace(0.0, along_m[-1], 1 + math.ceil(2.0 * along_m[-1] / floor.cell_m))
     places = np.column_stack([np.interp(at_m, along_m, axis) for axis in corners_xy_m.T])
     numbers = passage[floor.cells_of(places)].tolist()
-    parts: list[tuple[int, float, float]] = []
-    for number, at in zip(numbers, (at_m * length_m / along_m[-1]).tolist(), strict=True):
+    told_m = at_m * length_m / along_m[-1]
+    parts: list[tuple[int, int, int]] = []
+    for k, number in enumerate(numbers):
         if number == 0:
             continue
-        if parts and parts[-1][0] == number and at - parts[-1][2] < ASIDE_M:
-            parts[-1] = number, parts[-1][1], at
+        if parts and parts[-1][0] == number and told_m[k] - told_m[parts[-1][2]] < ASIDE_M:
+            parts[-1] = number, parts[-1][1], k
         else:
-            parts.append((number, at, at))
-    return parts
+            parts.append((number, k, k))
+    thin = max(1, int(LINE_M / max(float(at_m[1]), 1e-9)))
+    return [
+        ((number, float(told_m[i]), float(told_m[k])), np.vstack([places[i:k:thin], places[k : k + 1]]))
+        for number, i, k in parts
+    ]
+
+
+def _overlaps(lines: list[FloatArray]) -> dict[int, tuple[Overlap, ...]]:
+    """Which pieces, by their lines (K, 2), lie on each other, but for those that cross."""
+    low = np.array([line.min(axis=0) for line in lines]).reshape(-1, 2) - 0.5 * SAME_M
+    high = np.array([line.max(axis=0) for line in lines]).reshape(-1, 2) + 0.5 * SAME_M
+    found: dict[int, list[Overlap]] = {}
+    for one, line in enumerate(lines):
+        near = ((low[one] <= high) & (low <= high[one])).all(axis=1)
+        for other in np.flatnonzero(near[:one]).tolist():
+            sign, *shares = along.overlap(line, lines[other], SAME_M, ACROSS)
+            if sign != 0:
+                begin, end, their_begin, their_end = shares
+                found.setdefault(one, []).append(Overlap(other, sign, begin, end))
+                found.setdefault(other, []).append(Overlap(one, sign, their_begin, their_end))
+    return {piece: tuple(overlaps) for piece, overlaps in found.items()}

@@ -38,6 +38,8 @@ class PatrolSetting:
         (N, V) length of the path from each robot's starting place to each vertex; None: it is at its vertex.
     turn_m
         What turning back at a vertex costs, as a distance.
+    visit_m
+        Who is so near to a vertex visits it.
     talks
         Whether any two robots of the team could hear each other, by their data sheets.
     """
@@ -51,6 +53,7 @@ class PatrolSetting:
     passages: Passages = OPEN
     starts_m: FloatArray | None = None
     turn_m: float = 0.0
+    visit_m: float = 0.0
     talks: bool = True
 
     @property

@@ -9,6 +9,7 @@ import numpy as np
 
 from pilotage.core.types import FloatArray
 from pilotage.kernels.patrol import along
+from pilotage.stack.patrol.passages import ACROSS, SAME_M
 from pilotage.stack.patrol.roadmap import STEP_M
 from pilotage.stack.patrol.word import Claim
 
@@ -23,10 +24,8 @@ TURN_S = 15.0
 """Claims of so long are one turn for each direction."""
 RENEW_S = 20.0
 """Who did not get in for so long claims anew: what keeps it out need not keep others."""
-SAME_M = 0.6
-"""Two paths this near to each other are in the same passage."""
-ACROSS, LEAVES_M = 0.3, 0.75
-"""Paths whose headings agree by less, either way, cross; who is off the other's path so soon leaves it."""
+LEAVES_M = 0.75
+"""Of two whose paths cross, who is off the other's path so soon leaves it."""
 ASTRAY_S = 0.6
 """Who was not seen for so long is followed no more."""
 

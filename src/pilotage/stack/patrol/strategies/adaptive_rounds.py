@@ -14,16 +14,15 @@ from pydantic import Field
 from pilotage.core.config import Config
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.sensors.sensor import NonNegative, Positive
+from pilotage.stack.patrol.forecast import Driving, forecast_m
 from pilotage.stack.patrol.hearing import Hearing, Patience
 from pilotage.stack.patrol.leg_times import LegTimes
 from pilotage.stack.patrol.looking import Looking
-from pilotage.stack.patrol.meetings import is_crowded, keeps_apart, slowed
 from pilotage.stack.patrol.messages import NOTHING, PatrolKnowledge, PatrolState
 from pilotage.stack.patrol.partition import Plan, annealed, even_sizes
 from pilotage.stack.patrol.shut_paths import NONE_SHUT, OpenGraph, same_side
 from pilotage.stack.patrol.strategy import STRATEGIES, PatrolSetting
 from pilotage.stack.patrol.tours import Round, spread
-from pilotage.stack.patrol.turns import with_turns
 
 KEY, PHASE_M, PHASE_S, GONE = range(4)
 """What a robot says: which round it goes, how far along it was, when, and whom it looked for in vain."""
@@ -32,26 +31,27 @@ KEY, PHASE_M, PHASE_S, GONE = range(4)
 class AdaptiveRoundsConfig(Config):
     """How plans are weighed, and when a robot waits or gives another one up.
 
-    A plan's cost is its worst idleness plus ``mean_weight`` times its mean; of a round that several robots
-    share the worst counts ``sharing_cost`` more and the mean half of that, for what keeping apart costs, or
-    ``deaf_cost`` where nobody hears anybody, for what not keeping apart does; one on which they are nearer
-    to each other than ``headway_m`` is taken only where there is no other. In a passage that has room for
-    one, meeting who comes the other way takes ``meeting_m`` of driving beside its length. Turning back
-    takes ``late_m`` more than data sheets say, for decisions are made a few times a second. Where that
-    would lead to a worst idleness of more than ``worst_ratio`` times the bound, plans are weighed with it,
-    among those in which robots on one round are ``headway_m`` apart and do not meet in passages. A robot
-    waits while it is further ahead of its place among those that share its round than ``slack`` of a mean
-    leg between stops, within which nobody knows where the others are, or ``most_slack`` of the time between
-    them. At a stop in a passage that has room for one, or no farther than ``beside_passage_m`` from it, it
-    never waits: those who are late would have to come by.
+    Rounds are looked for whose worst idleness plus ``mean_weight`` times their mean is little; the worst of
+    one that several robots share counts ``sharing_cost`` more there and its mean half of that. Of the plans
+    found the one is taken whose forecast is best: its worst plus ``forecast_mean_weight`` times its mean,
+    ``sharing_cost`` of that more where robots share a round, for what no forecast knows of. In a forecast
+    legs take up to ``late_ratio`` longer at random, who has waited before a passage that has room for one
+    takes ``meeting_m`` of driving longer, and turning back takes ``late_m`` more than data sheets say, for
+    decisions are made a few times a second. A round on which robots are nearer to each other than
+    ``headway_m``, who watch and avoid each other all the time, is taken only where there is no other.
+
+    A robot waits while it is further ahead of its place among those that share its round than ``slack`` of a
+    mean leg between stops, within which nobody knows where the others are, or ``most_slack`` of the time
+    between them. At a stop in a passage that has room for one, or no farther than ``beside_passage_m`` from
+    it, it never waits: those who are late would have to come by.
     """
 
     mean_weight: NonNegative = 2.0
     sharing_cost: NonNegative = 0.06
-    deaf_cost: NonNegative = 0.15
+    forecast_mean_weight: NonNegative = 0.5
+    late_ratio: NonNegative = 0.25
     meeting_m: NonNegative = 2.5
     late_m: NonNegative = 0.4
-    worst_ratio: Positive = 1.25
     headway_m: NonNegative = 6.0
     slack: Positive = 0.5
     most_slack: Positive = Field(default=0.1, le=0.5)
@@ -65,55 +65,41 @@ class AdaptiveRoundsConfig(Config):
 
 
 def best_plan(setting: PatrolSetting, robots: int, config: AdaptiveRoundsConfig) -> Plan:
-    """The cheapest plan for so many robots: one round for all, one for each, and what lies between.
+    """The plan for so many robots that is forecast to be best: one round for all, one for each, or between.
 
-    How many rounds is chosen by lengths and waits, and its rounds are those that turn back least for that.
-    Where they promise more than the worst that is asked for, turning back included, it is chosen by lengths,
-    waits and turns, among plans whose robots go one way where there is room for one.
-
-    Where nobody hears anybody nothing keeps those who share a round apart, and small delays add up: sharing
-    costs more there.
+    Of every number of rounds those that are shortest, and those that turn back least for that.
     """
     graph = setting.graph
     most = min(robots, len(graph))
-    sharing_cost = config.sharing_cost if setting.talks else config.deaf_cost
-    weights = config.mean_weight, sharing_cost
     # What lies between is much alike: a few numbers of groups stand for all.
     numbers = {1, 2, 3, robots // 2, robots - 1, robots, most}
-    sizes = [even_sizes(robots, groups) for groups in sorted(numbers) if 1 <= groups <= most]
-
-    def promises(plan: Plan) -> tuple[float, float]:
-        driven = slowed(plan, setting.passages, config.meeting_m)
-        worst_m, mean_m = driven.expected_m(len(graph), sharing_cost)
-        return worst_m, worst_m + config.mean_weight * mean_m
-
-    def crowds(plan: Plan) -> bool:
-        shared = zip(plan.rounds, plan.sizes, strict=True)
-        return any(is_crowded(*walk_and_size, setting.passages, config.headway_m) for walk_and_size in shared)
-
-    # Such plans only where there are no others.
-    plans = (annealed(graph, even, *weights) for even in sizes)
-    usual = min(plans, key=lambda plan: (crowds(plan), promises(plan)[1]))
-    usual = annealed(graph, usual.sizes, *weights, setting.turn_m)
-    if setting.turn_m <= 0.0:
-        return usual
-
-    def turning(plan: Plan) -> tuple[float, float]:
-        return promises(with_turns(plan, graph, setting.turn_m + config.late_m))
-
-    if turning(usual)[0] <= config.worst_ratio * Round.best(graph).length_m / robots:
-        return usual
-    others = [annealed(graph, even, *weights, setting.turn_m) for even in sizes]
-    distances = config.headway_m, config.meeting_m
-    apart = [
-        plan
-        for plan in others
-        if all(
-            keeps_apart(walk, size, setting.passages, *distances)
-            for walk, size in zip(plan.rounds, plan.sizes, strict=True)
-        )
+    plans = [
+        annealed(graph, even_sizes(robots, groups), config.mean_weight, config.sharing_cost, turn_m)
+        for groups in sorted(numbers)
+        if 1 <= groups <= most
+        for turn_m in sorted({0.0, setting.turn_m})
     ]
-    return min([usual, *apart], key=lambda plan: turning(plan)[1])
+    driving = Driving(
+        visit_m=setting.visit_m,
+        turn_m=setting.turn_m + config.late_m if setting.turn_m > 0.0 else 0.0,
+        meeting_m=config.meeting_m,
+        late_ratio=config.late_ratio,
+        slack=config.slack,
+        most_slack=config.most_slack,
+        beside_m=config.beside_passage_m,
+        talks=setting.talks,
+    )
+
+    def cost(plan: Plan) -> tuple[bool, float]:
+        worst_m, mean_m = forecast_m(plan, graph, setting.passages, driving)
+        sharing = config.sharing_cost if max(plan.sizes) > 1 else 0.0
+        together = zip(plan.rounds, plan.sizes, strict=True)
+        is_crowded = any(
+            size > 1 and 0.0 < walk.length_m < size * config.headway_m for walk, size in together
+        )
+        return is_crowded, (1.0 + sharing) * (worst_m + config.forecast_mean_weight * mean_m)
+
+    return min(plans, key=cost)
 
 
 @STRATEGIES.add("adaptive-rounds", AdaptiveRoundsConfig)

@@ -1,0 +1,289 @@
+"""Robots driven round closed walks as points: they wait before what has room for one, and keep apart.
+
+Time is told as the distance that a robot drives meanwhile at its full speed.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from pilotage.kernels.arrays import BoolArray, FloatArray, IntArray
+from pilotage.kernels.jit import kernel
+
+NONE = -1
+BEHIND_M = 1.0
+"""In a passage nobody comes nearer to the one ahead."""
+CLAIM_M = 4.0
+"""From so far before a passage robots are served in the order in which they come."""
+NEVER = np.inf
+
+
+class Walks(NamedTuple):
+    """Closed walks one after the other, and what of them others come through the other way.
+
+    Attributes
+    ----------
+    first_stop, first_section
+        (G + 1,) where each walk's stops and sections begin.
+    length
+        (G,) of each.
+    stops, legs, turns
+        (K,) vertices, lengths of the legs after them, and what turning back there takes.
+    mouths, through
+        (S,) where sections begin along their walks, ascending, and their lengths.
+    until
+        (S, S) how far through the second one a robot keeps others out of the first; 0 where it never does.
+    is_tight
+        (V,) whether nobody waits at a vertex for others to catch up.
+    """
+
+    first_stop: IntArray
+    first_section: IntArray
+    length: FloatArray
+    stops: IntArray
+    legs: FloatArray
+    turns: FloatArray
+    mouths: FloatArray
+    through: FloatArray
+    until: FloatArray
+    is_tight: BoolArray
+
+
+class Manner(NamedTuple):
+    """How robots drive, all as distances but two ratios.
+
+    Attributes
+    ----------
+    step, warm_up, total
+        Of the reckoning; what happens in the ``warm_up`` is not judged.
+    visit
+        Who is so near to a vertex visits it.
+    meeting
+        What waiting before a passage takes longer: braking and starting.
+    late_ratio
+        Legs take longer at random, up to so much.
+    slack_ratio, most_slack_ratio
+        A robot waits for others of its walk that are late by more than this share of a mean leg, or of the
+        distance between them.
+    waits
+        Whether it does.
+    """
+
+    step: float
+    warm_up: float
+    total: float
+    visit: float
+    meeting: float
+    late_ratio: float
+    slack_ratio: float
+    most_slack_ratio: float
+    waits: bool
+
+
+class Team(NamedTuple):
+    """What robots (N,) are at: walk, place along it, next stop and section; the section they are in.
+
+    ``behind`` is how far they are into that; ``to_stop`` and ``to_mouth`` are what is left to the next ones;
+    ``rest`` is how long they stand yet, ``claimed`` since when they want into their next section, ``waited``
+    for how long they have let others catch up where they stand; ``pace`` is their speed's share.
+    """
+
+    group: IntArray
+    along: FloatArray
+    stop: IntArray
+    section: IntArray
+    within: IntArray
+    behind: FloatArray
+    to_stop: FloatArray
+    to_mouth: FloatArray
+    rest: FloatArray
+    claimed: FloatArray
+    waited: FloatArray
+    pace: FloatArray
+    is_held: BoolArray
+    is_at_stop: BoolArray
+
+
+@kernel
+def drive_rounds(
+    walks: Walks, group: IntArray, along: FloatArray, late: FloatArray, manner: Manner
+) -> tuple[float, float]:
+    """The worst and the mean time since vertices were visited last, as distances.
+
+    Parameters
+    ----------
+    group, along
+        (N,) the walk of each robot, and where along it it begins.
+    late
+        (D,) from 0 to 1: how late legs are, one after the other, over and over.
+    """
+    count, vertices = group.shape[0], walks.is_tight.shape[0]
+    team = _begin(walks, group, along)
+    last = np.zeros(vertices)
+    judged = np.zeros(2)  # the longest time, and the sum of squares
+    drawn = 0
+    for tick in range(int(manner.total / manner.step)):
+        now = tick * manner.step
+        for robot in range(count):
+            first, end = walks.first_stop[group[robot]], walks.first_stop[group[robot] + 1]
+            if walks.length[group[robot]] <= 0.0:
+                last[walks.stops[first]] = now
+                continue
+            if team.rest[robot] > 0.0:
+                team.rest[robot] -= manner.step
+                continue
+            if team.is_at_stop[robot]:
+                here = team.stop[robot] - 1 if team.stop[robot] > first else end - 1
+                if manner.waits and _is_ahead(walks, team, robot, here, manner):
+                    team.waited[robot] += manner.step
+                    last[walks.stops[here]] = now
+                    continue
+                team.waited[robot], team.is_at_stop[robot] = 0.0, False
+            if not _advance(walks, team, robot, now, manner):
+                continue
+            if team.to_stop[robot] <= 0.0:
+                here = team.stop[robot]
+                vertex = walks.stops[here]
+                _judge(judged, max(0.0, now - last[vertex] - 2.0 * manner.visit), now, manner.warm_up)
+                team.rest[robot] = walks.turns[here]
+                last[vertex] = now + team.rest[robot]
+                team.to_stop[robot] += walks.legs[here]
+                team.stop[robot] = here + 1 if here + 1 < end else first
+                team.is_at_stop[robot] = True
+                team.pace[robot] = 1.0 / (1.0 + manner.late_ratio * late[drawn % late.shape[0]])
+                drawn += 1
+    for vertex in range(vertices):
+        # Who comes next may be near enough already.
+        gap = max(0.0, manner.total - last[vertex] - 2.0 * manner.visit)
+        _judge(judged, gap, manner.total, manner.warm_up)
+    return judged[0], judged[1] / (2.0 * (manner.total - manner.warm_up) * vertices)
+
+
+@kernel
+def _begin(walks: Walks, group: IntArray, along: FloatArray) -> Team:
+    """Robots where they begin, on their way to the next stop and section, in none."""
+    count = group.shape[0]
+    team = Team(
+        group,
+        along.copy(),
+        np.zeros(count, np.int64),
+        np.full(count, NONE),
+        np.full(count, NONE),
+        np.zeros(count),
+        np.zeros(count),
+        np.full(count, NEVER),
+        np.zeros(count),
+        np.full(count, NEVER),
+        np.zeros(count),
+        np.ones(count),
+        np.zeros(count, np.bool_),
+        np.zeros(count, np.bool_),
+    )
+    for robot in range(count):
+        length, at = walks.length[group[robot]], 0.0
+        stop, end = walks.first_stop[group[robot]], walks.first_stop[group[robot] + 1]
+        while stop < end and at < along[robot] - 1e-9:
+            at += walks.legs[stop]
+            stop += 1
+        team.stop[robot] = stop if stop < end else walks.first_stop[group[robot]]
+        team.to_stop[robot] = max(0.0, at - along[robot])
+        for section in range(walks.first_section[group[robot]], walks.first_section[group[robot] + 1]):
+            ahead = (walks.mouths[section] - along[robot]) % length
+            if ahead < team.to_mouth[robot]:
+                team.section[robot], team.to_mouth[robot] = section, ahead
+    return team
+
+
+@kernel
+def _judge(judged: FloatArray, gap: float, now: float, warm_up: float) -> None:
+    """Count what of a time without a visit lies beyond the warm-up."""
+    if now > warm_up:
+        judged[0] = max(judged[0], gap)
+        before = max(0.0, gap - (now - warm_up))
+        judged[1] += gap * gap - before * before
+
+
+@kernel
+def _is_ahead(walks: Walks, team: Team, robot: int, here: int, manner: Manner) -> bool:
+    """Whether a robot lets others of its walk catch up: ahead of the even row behind one that drives."""
+    group = team.group[robot]
+    length, size, behind = walks.length[group], 0, 0.0
+    if walks.is_tight[walks.stops[here]]:
+        return False
+    for mate in range(team.group.shape[0]):
+        size += team.group[mate] == group
+    apart = length / size
+    for mate in range(team.group.shape[0]):
+        if mate == robot or team.group[mate] != group or team.is_at_stop[mate]:
+            continue
+        gap, rank = (team.along[mate] - team.along[robot]) % length, 1
+        for third in range(team.group.shape[0]):
+            if third != robot and third != mate and team.group[third] == group:
+                between = (team.along[third] - team.along[robot]) % length
+                rank += between < gap or (between == gap and third < mate)
+        behind = min(behind, gap - rank * apart)
+    legs = walks.first_stop[group + 1] - walks.first_stop[group]
+    slack = min(manner.slack_ratio * length / legs, manner.most_slack_ratio * apart)
+    return bool(-behind > slack and team.waited[robot] <= 0.5 * apart)
+
+
+@kernel
+def _is_taken(walks: Walks, team: Team, robot: int) -> bool:
+    """Whether somebody is in what a robot's next section shares the other way, or is to go first."""
+    own = team.section[robot]
+    for mate in range(team.group.shape[0]):
+        if mate == robot:
+            continue
+        if team.within[mate] != NONE:
+            if team.behind[mate] < walks.until[own, team.within[mate]]:
+                return True
+        elif team.claimed[mate] < team.claimed[robot] and walks.until[own, team.section[mate]] > 0.0:
+            return True
+    return False
+
+
+@kernel
+def _is_close(walks: Walks, team: Team, robot: int) -> bool:
+    """Whether another one of its walk is right ahead in the same section."""
+    length = walks.length[team.group[robot]]
+    for mate in range(team.group.shape[0]):
+        ahead = (team.along[mate] - team.along[robot]) % length
+        if mate != robot and team.within[mate] == team.within[robot] and 0.0 < ahead < BEHIND_M:
+            return True
+    return False
+
+
+@kernel
+def _advance(walks: Walks, team: Team, robot: int, now: float, manner: Manner) -> bool:
+    """Drive a step along the walk, into and out of sections, unless others are in the way."""
+    group, step = team.group[robot], manner.step * team.pace[robot]
+    length = walks.length[group]
+    if team.within[robot] == NONE and team.section[robot] != NONE:
+        if team.to_mouth[robot] < CLAIM_M:
+            team.claimed[robot] = min(team.claimed[robot], now)
+        if team.to_mouth[robot] <= step:
+            if _is_taken(walks, team, robot):
+                team.is_held[robot] = True
+                return False
+            team.within[robot], team.behind[robot] = team.section[robot], 0.0
+            team.claimed[robot] = NEVER
+            if team.is_held[robot]:
+                team.is_held[robot], team.rest[robot] = False, manner.meeting
+    if team.within[robot] != NONE and _is_close(walks, team, robot):
+        return False
+    team.along[robot] = (team.along[robot] + step) % length
+    team.to_stop[robot] -= step
+    team.to_mouth[robot] -= step
+    section = team.within[robot]
+    if section != NONE:
+        team.behind[robot] += step
+        if team.behind[robot] >= walks.through[section]:
+            last = walks.first_section[group + 1] - 1
+            following = section + 1 if section < last else walks.first_section[group]
+            # What it has come farther than the end of this one, the next one may already have begun.
+            ends = walks.mouths[section] + walks.through[section]
+            ahead = (walks.mouths[following] - ends) % length - (team.behind[robot] - walks.through[section])
+            team.within[robot], team.section[robot], team.to_mouth[robot] = NONE, following, max(0.0, ahead)
+    return True
