@@ -330,12 +330,24 @@ def test_what_a_component_keeps_is_looked_at_with_what_it_gives() -> None:
         ("mapper", False, "circles_m", np.zeros((2, 2))),
         ("people", np.zeros((1, 2)), "radius_m", np.zeros(1)),
         ("motion", None, "moves", np.full((1, 3), NAN)),
-        ("motion", None, "moves", np.zeros((2, 3))),
     ):
         method = made(role, gives)
         setattr(method.__self__, name, value)
         with pytest.raises(InputError, match=f"{role} 'mine' of 'somebodys': .*: expected"):
             method(*CALLED_WITH.get(role, ()))
+
+
+@pytest.mark.parametrize(("method", "called_with"), [("command", (Twist(0.1, 0.0),)), ("stop", ())])
+def test_a_motion_makes_as_many_moves_as_at_first(method: str, called_with: tuple[object, ...]) -> None:
+    """The body's arrays are as long; nothing is left on the motion to remember it by."""
+
+    def another(motion: Any, *_: object) -> None:
+        motion.moves = np.zeros((2, 3))
+
+    motion = made("motion", None, **{method: another}).__self__
+    assert not hasattr(motion, "moves_a_step")
+    with pytest.raises(InputError, match=f"'mine' of 'somebodys': {method}: .*, found 2 moves instead of 1"):
+        getattr(motion, method)(*called_with)
 
 
 @pytest.mark.parametrize(

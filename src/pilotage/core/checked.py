@@ -32,12 +32,16 @@ class Gives:
         where nothing is.
     optional
         Whether a component may be without the method.
+    before
+        What of the component is looked at before the method is called, and handed to ``wrong`` after the
+        component: for what a call must not change.
     """
 
     method: str
     expected: str
     wrong: Callable[..., str]
     optional: bool = False
+    before: Callable[[Any], Any] | None = None
 
 
 def keeps(expected: str, wrong: Callable[[Any], str]) -> Gives:
@@ -85,8 +89,9 @@ def _looked_at(cls: type, whose: str, gives: Gives) -> Callable[..., Any]:
     def look(self: Any, *args: Any, **kwargs: Any) -> Any:
         if built:
             _require_taken(its_own, whose, (self, *args), kwargs)
+        before = () if gives.before is None else (gives.before(self),)
         given = None if its_own is object.__init__ else its_own(self, *args, **kwargs)
-        found = gives.wrong(given, self, *args, *kwargs.values())
+        found = gives.wrong(given, self, *before, *args, *kwargs.values())
         if found:
             raise InputError(f"{where}: expected {gives.expected}, found {found}")
         return given

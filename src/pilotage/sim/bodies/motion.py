@@ -58,22 +58,27 @@ def _unfit_kept(motion: SimulatedMotion) -> str:
     spins_on, release_m = (kept(motion, name) for name in ("spins_on", "release_m"))
     if not isinstance(spins_on, bool | np.bool_):
         return f"spins_on {told(spins_on)}"
-    # The body's arrays are as long as these.
-    motion.moves_a_step = len(moves)  # type: ignore[attr-defined]
     return unfit_number(release_m) and f"release_m {unfit_number(release_m)}"
 
 
-def _unfit(_: None, motion: SimulatedMotion, *__: object) -> str:
+def _count(motion: SimulatedMotion) -> int:
+    return len(motion.moves)
+
+
+def _unfit(_: None, motion: SimulatedMotion, before: int, *__: object) -> str:
     wrong = unfit_array(motion.moves, 3)
-    count: int = motion.moves_a_step  # type: ignore[attr-defined]
-    return wrong or ("" if len(motion.moves) == count else f"{len(motion.moves)} moves instead of {count}")
+    # The body's arrays are as long as the first moves.
+    if wrong or len(motion.moves) == before:
+        return wrong
+    return f"{len(motion.moves)} moves instead of {before}"
 
 
 SIMULATED_MOTIONS: ByConfig[SimulatedMotion] = ByConfig(
     "motion",
     "pilotage.sim.bodies",
     keeps("moves (K, 3) of numbers, K never another, spins_on and release_m", _unfit_kept),
-    Gives("command", "moves (K, 3) of finite numbers", _unfit),
+    Gives("command", "moves (K, 3) of finite numbers", _unfit, before=_count),
+    Gives("stop", "moves (K, 3) of finite numbers", _unfit, before=_count),
 )
 """Data sheets to what they truly do."""
 
