@@ -15,13 +15,16 @@ class OdometryIncrement:
     """Motion since the last odometry reading: distance along the arc and change of heading.
 
     A base that drives sideways has a distance to the left besides. Where it is known how uncertain this very
-    turn is, as of one that wheels and gyroscope tell together, that counts instead of the data sheet.
+    turn is, as of one that wheels and gyroscope tell together, that counts instead of the data sheet. Of one
+    that is a part of a longer increment ``part_var`` says how uncertain it is which part: variances ahead and
+    to the left (m^2) and of the turn (rad^2), besides.
     """
 
     distance_m: float
     angle_rad: float
     lateral_m: float = 0.0
     angle_var_rad2: float | None = None
+    part_var: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)

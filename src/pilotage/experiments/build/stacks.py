@@ -26,7 +26,8 @@ from pilotage.stack.control.reactive import REACTIVES
 from pilotage.stack.interface import NAVIGATORS, Belief, BeliefStatus, Stack
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
-from pilotage.stack.localization.between_increments import in_between
+from pilotage.stack.localization.between_increments import BetweenIncrements, in_between
+from pilotage.stack.localization.commanded_motion import CommandedStack
 from pilotage.stack.localization.heading_filter import HEADING_FILTERS, HeadingEstimate, HeadingFilter
 from pilotage.stack.localization.localizer import LOCALIZERS, Localizer
 from pilotage.stack.mapping.mapper import MAPPERS
@@ -143,6 +144,7 @@ def build_stack(
     stack = build_component(NAVIGATORS, config.navigator, "navigator", robot, chart, task, parts, journal)
     watched = parts.localizer
     stack = WatchedStack(stack, watched.watched) if isinstance(watched, WatchedLocalizer) else stack
+    stack = CommandedStack(stack, localizer.commanded) if isinstance(localizer, BetweenIncrements) else stack
     return stack if join is None else JoiningStack(stack, join)
 
 

@@ -83,6 +83,11 @@ class MotionConfig(Config):
         """How fast it can change its turn rate; inf for who does so at once."""
         return math.inf
 
+    @property
+    def lag_s(self) -> float:
+        """Time constant with which its rates follow their commands; 0 for who follows at once."""
+        return 0.0
+
 
 class LimitedMotionConfig(MotionConfig):
     """A motion whose speed and turn rate follow the command within limits of acceleration."""

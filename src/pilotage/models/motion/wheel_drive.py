@@ -49,3 +49,8 @@ class WheelDriveConfig(MotionConfig):
     def top_turn_rate_rad_s(self) -> float:
         """The wheels at their fastest against each other."""
         return 2.0 * self.max_wheel_speed_rad_s * self.wheel_radius_m / self.wheel_separation_m
+
+    @property
+    def lag_s(self) -> float:
+        """That of its motors."""
+        return self.motor_lag_s

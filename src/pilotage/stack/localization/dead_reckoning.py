@@ -77,6 +77,8 @@ class DeadReckoningLocalizer:
     as it says is the region of ``kernels/filters/bent_region.py``, told in the columns ``REGION_COLUMNS``.
     """
 
+    corrects = False
+
     def __init__(
         self,
         config: DeadReckoningConfig,

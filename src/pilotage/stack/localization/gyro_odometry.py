@@ -175,7 +175,8 @@ class GyroOdometry:
         turned = heading.correct_by_gyro(self._state, self._P, apart, over_s, self._wheels_cov, var)
         told = max(least, float(self._P[0, 0]) - before, 0.0)
         self._P[0, 0] = before + told
-        return replace(odometry, angle_rad=wheels + turned, angle_var_rad2=told)
+        part_var = (*odometry.part_var[:2], 0.0)  # that of the turn is within
+        return replace(odometry, angle_rad=wheels + turned, angle_var_rad2=told, part_var=part_var)
 
     def _wheels_var_of(self, odometry: OdometryIncrement, turn_rad: float) -> float:
         """Variance of the wheels' turn, by the turn that the gyroscope tells of.

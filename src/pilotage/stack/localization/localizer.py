@@ -66,6 +66,8 @@ class Abilities:
         Told before each step where mates say that they are, (K, 4) as of ``ScanFit.mates_in_sight``.
     scan_grid
         The map that it draws; None where it draws none.
+    corrects
+        Whether anything that it senses corrects what it reckons.
     close_loops, refine
         Of one that draws a map: look for loops here and now, how many closed; align all of it once more.
     """
@@ -73,6 +75,7 @@ class Abilities:
     look_bearing_rad: Callable[[], float | None] = _anywhere
     tell_mates: Callable[[FloatArray], None] = _to_nobody
     scan_grid: ScanGrid | None = None
+    corrects: bool = True
     close_loops: Callable[[], int] = _no_loops
     refine: Callable[[], None] = _nothing
 
@@ -89,7 +92,8 @@ class WrappedLocalizer:
     def __init__(self, localizer: Localizer) -> None:
         self._localizer, able = localizer, Abilities.of(localizer)
         self.look_bearing_rad, self.tell_mates = able.look_bearing_rad, able.tell_mates
-        self.scan_grid, self.close_loops, self.refine = able.scan_grid, able.close_loops, able.refine
+        self.scan_grid, self.corrects = able.scan_grid, able.corrects
+        self.close_loops, self.refine = able.close_loops, able.refine
 
     @property
     def belief(self) -> Belief:

@@ -73,12 +73,12 @@ class OdometryPrediction:
         distance, angle = increment_variances(odometry.distance_m, odometry.angle_rad, *self._densities)
         if odometry.lateral_m != 0.0:
             angle += increment_variances(odometry.lateral_m, 0.0, *self._densities)[1]
-        own = odometry.angle_var_rad2
-        return distance, angle if own is None else own
+        own, part = odometry.angle_var_rad2, odometry.part_var
+        return distance + part[0], (angle if own is None else own) + part[2]
 
     def lateral_variance(self, odometry: OdometryIncrement) -> float:
         """Variance of what an increment tells of driving to the left, which errs as driving forwards does."""
-        return increment_variances(odometry.lateral_m, 0.0, *self._densities)[0]
+        return increment_variances(odometry.lateral_m, 0.0, *self._densities)[0] + odometry.part_var[1]
 
     def move(self, pose: FloatArray, cov: FloatArray, odometry: OdometryIncrement) -> None:
         """Move ``pose`` (3,) and ``cov`` (3, 3) in place."""

@@ -20,7 +20,7 @@ from pilotage.stack.interface import NAVIGATORS, Belief, BeliefStatus, StackStat
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.localization.dead_reckoning import DeadReckoningConfig, DeadReckoningLocalizer
-from pilotage.stack.localization.localizer import Localizer
+from pilotage.stack.localization.localizer import Abilities, Localizer
 from pilotage.stack.navigator.navigator import (
     LocalizingNavigator,
     Parts,
@@ -99,7 +99,7 @@ class LocalNavigator(LocalizingNavigator):
             shift_m=config.shift_m,
             needed_by="navigator 'local'",
             goal_xy_m=self._goal_xy_m,
-            localized=not isinstance(parts.localizer, DeadReckoningLocalizer | None),
+            localized=parts.localizer is not None and Abilities.of(parts.localizer).corrects,
         )
         localizer: Localizer = parts.localizer or DeadReckoningLocalizer(
             DeadReckoningConfig(), robot, chart, task.initial, journal
