@@ -28,7 +28,7 @@ from pilotage.kernels.control.togo import UNREACHED_S, descent_path, time_to_go
 from pilotage.kernels.geometry.motion import exact_arc
 from pilotage.kernels.grids.distance import nearest_marked
 from pilotage.kernels.scans.rays import fan_ranges
-from pilotage.stack.control.local.body import make_body
+from pilotage.stack.control.local.body import dense_m, make_body
 from support.seen_ground import DRIVE, JACKAL, ground_of
 
 NOBODY = np.zeros((1, 0, 3))
@@ -75,7 +75,7 @@ def test_sectors_leave_out_only_what_no_beam_reaches(beams: int, view_rad: float
             left, known = hits.copy(), seen.copy()
             mount, points, first = np.array([0.1, 0.05, 0.4]), np.zeros((0, 2)), -0.5 * view_rad
             insert_scan(
-                left, mean, known, pose, mount, ranges, of_sectors, first, step, 9.0, 4.0,
+                left, mean, known, pose, mount, ranges, of_sectors, first, step, 9.0, 4.0, 9.0,
                 points, body.polygon, 0.05, 3, -3.0, -3.0, 0.1,
             )  # fmt: skip
             outcomes.append((left, known))
@@ -83,6 +83,22 @@ def test_sectors_leave_out_only_what_no_beam_reaches(beams: int, view_rad: float
         assert (outcomes[0][1] == outcomes[1][1]).all()
         assert (outcomes[0][0] < hits).any()
         assert outcomes[0][1].any()
+
+
+def test_ground_between_beams_that_an_obstacle_fits_between_was_not_seen() -> None:
+    """Three beams showed a room as empty as far as they reached."""
+    cell, n = 0.1, 100
+    hits, mean = np.zeros((n, n), np.uint8), np.zeros((n * n, 2))
+    still, body, step = np.zeros(3), make_body(JACKAL), 0.8
+    seen = np.zeros((n // 2, n // 2), np.bool_)
+    insert_scan(
+        hits, mean, seen, still, still, np.full(3, 4.0), sectors(3, step), -step, step, 9.0, 4.0,
+        dense_m(0.5, step), np.zeros((0, 2)), body.polygon, 0.05, 3, -5.0, -5.0, cell,
+    )  # fmt: skip
+    rows, columns = np.nonzero(seen)
+    away_m = np.hypot(-5.0 + 2.0 * cell * (rows + 0.5), -5.0 + 2.0 * cell * (columns + 0.5))
+    assert 0.7 < away_m.max() <= dense_m(0.5, step) == pytest.approx(1.0 / math.tan(step))
+    assert dense_m(0.5, 0.5 * math.pi) == dense_m(0.5, 0.0) == 0.0
 
 
 def test_beams_are_evenly_spaced_or_not() -> None:
@@ -332,7 +348,7 @@ def _stared_at(depth_m: float, seconds: float) -> tuple[ByteArray, FloatArray]:
         points = np.column_stack([ranges * np.cos(angles), ranges * np.sin(angles)])
         insert_scan(
             hits, mean, seen, still, still, ranges, sectors(beams, step), float(angles[0]), step, 9.0, 4.0,
-            points, body.polygon, 0.05, 3, -1.5, -1.5, cell,
+            9.0, points, body.polygon, 0.05, 3, -1.5, -1.5, cell,
         )  # fmt: skip
     return believed(hits), mean
 

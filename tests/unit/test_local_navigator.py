@@ -13,8 +13,9 @@ from pilotage.core.types import STOP, Pose2, Twist
 from pilotage.models.footprint import Footprint
 from pilotage.models.motion.bicycle import BicycleConfig
 from pilotage.models.motion.differential_drive import DifferentialDriveConfig
+from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, OdometryIncrement, Reading, Readings
-from pilotage.stack.control.local.drive import limits_of, polygon_around
+from pilotage.stack.control.local.drive import in_sight, limits_of, polygon_around
 from pilotage.stack.control.local.role import LocalView
 from pilotage.stack.interface import Belief, StackStatus
 from pilotage.stack.navigator.local import LocalConfig, LocalNavigator
@@ -174,6 +175,23 @@ def test_limits_are_those_of_the_data_sheet() -> None:
     assert (limits.speed_m_s, limits.reverse_m_s, limits.delay_s) == (1.5, 1.5, 0.1)
     assert (limits.acceleration_m_s2, limits.deceleration_m_s2) == (1.2, 1.2)
     assert (limits.turn_rate_rad_s, limits.turn_acceleration_rad_s2) == (3.0, 5.0)
+
+
+def test_it_is_no_faster_than_it_can_stop_where_it_sees() -> None:
+    """At 1 m/s with a laser of half a metre, or of three beams, it ran into walls."""
+    robot = replace(told_of().robot, footprint=Footprint.disc(0.3))
+    limits = limits_of(robot, 0.5, "the test")
+    assert in_sight(limits, robot, LidarConfig(), "the test") == limits, "a laser that sees far"
+    for lidar, shown_m in (
+        (LidarConfig(max_range_m=0.5), 0.5),
+        (LidarConfig(beams=3, field_of_view_rad=2.0), 0.6 / math.tan(1.0)),
+    ):
+        speed = in_sight(limits, robot, lidar, "the test").speed_m_s
+        stops_m = speed * 0.1 + 0.5 * speed**2 / limits.deceleration_m_s2
+        assert stops_m == pytest.approx(shown_m - 0.3)
+    for blind in (LidarConfig(max_range_m=0.2), LidarConfig(beams=3), LidarConfig(beams=1)):
+        with pytest.raises(InputError, match=r"the test: expected a laser that shows the ground before the"):
+            in_sight(limits, robot, blind, "the test")
 
 
 def test_the_outline_of_a_disc_holds_it() -> None:

@@ -69,6 +69,7 @@ def insert_scan(
     step: float,
     max_range: float,
     reach: float,
+    dense: float,
     in_base: FloatArray,
     polygon: FloatArray,
     inside: float,
@@ -85,6 +86,8 @@ def insert_scan(
         (3,) of the base, and of the laser on it.
     of_sectors
         (2, ``SECTORS``) as ``sectors`` has it.
+    dense
+        As far from the laser no obstacle fits between two beams; farther than that nothing is seen.
     in_base
         (N, 2) points that the scan ends at and the grid shall keep, those within ``reach`` of the laser.
     inside
@@ -101,7 +104,7 @@ def insert_scan(
         _clear_passed(hits, mean, x, y, theta, ranges, far, first, step, max_range, cell, fade)
     _add_points(hits, mean, in_base, pose[0], pose[1], c, s, mount[0], mount[1], reach, x0, y0, cell)
     _clear_inside(hits, mean, pose[0], pose[1], c, s, polygon, inside, x0, y0, cell)
-    _mark_seen(seen, x, y, theta, ranges, far, first, step, x0, y0, 2.0 * cell, reach)
+    _mark_seen(seen, x, y, theta, ranges, far, first, step, x0, y0, 2.0 * cell, min(reach, dense))
 
 
 @kernel
@@ -266,7 +269,7 @@ def _mark_seen(
 ) -> None:
     """Mark the coarse cells (m, m) whose centre both beams beside it reach; in place.
 
-    Between beams that are farther apart than an obstacle is wide nothing is known: ``reach`` ends there.
+    Between beams that are farther apart than an obstacle is wide nothing is known: ``reach`` ends before.
     """
     m = seen.shape[0]
     beams = ranges.shape[0]

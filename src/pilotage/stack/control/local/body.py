@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from pilotage.core.errors import InputError
@@ -70,3 +72,12 @@ def _clipped(polygon: FloatArray, axis: int, at: float, sign: float) -> FloatArr
         if inside_a != inside_b:
             out.append(a + (b - a) * (at - a[axis]) / (b[axis] - a[axis]))
     return np.array(out)
+
+
+def dense_m(inner_m: float, beam_step_rad: float) -> float:
+    """How far ahead of the laser nothing as wide as the body, 2 ``inner_m``, fits between two beams.
+
+    That is between one straight ahead and the next one, across the way: 2 ``inner_m`` / tan(step).
+    From a right angle on, and of a single beam, nowhere.
+    """
+    return 2.0 * inner_m / math.tan(beam_step_rad) if 0.0 < beam_step_rad < 0.5 * math.pi - 1e-9 else 0.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from pilotage.models.odometry import increment_variances
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, OdometryIncrement, Readings
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
+from pilotage.stack.control.local.body import dense_m
 from pilotage.stack.control.local.role import LocalController, LocalLimits, LocalView
 from pilotage.stack.interface import Belief
 from pilotage.stack.knowledge import RobotKnowledge
@@ -50,7 +52,7 @@ class LocalDrive:
         self._controller, self._shift_m = controller, shift_m
         self._lidar, self._scanner = robot.one_sensor(LidarConfig, needed_by)
         self._odometry, self._wheels = robot.one_sensor(WheelOdometryConfig, needed_by)
-        self._limits = limits_of(robot, reverse_m_s, needed_by)
+        self._limits = in_sight(limits_of(robot, reverse_m_s, needed_by), robot, self._scanner, needed_by)
         self._outline = polygon_around(robot.footprint)
         self._angles = self._scanner.beam_angles_rad()
         mount = self._scanner.mount
@@ -195,6 +197,31 @@ def limits_of(robot: RobotKnowledge, reverse_m_s: float, needed_by: str) -> Loca
         turn_acceleration_rad_s2=min(motion.turn_acceleration_rad_s2, rate / robot.dt_s),
         delay_s=motion.delay_s,
     )
+
+
+def in_sight(limits: LocalLimits, robot: RobotKnowledge, lidar: LidarConfig, needed_by: str) -> LocalLimits:
+    """Limits no faster than the robot can stop on the ground that its laser surely shows.
+
+    v r + v^2 / (2 a) <= s, with the time r from a scan until the robot brakes for it, and the way s from the
+    body's front to where the laser's reach ends, or something as wide as the robot fits between two beams.
+
+    Raises
+    ------
+    InputError
+        Where the laser shows nothing before the body.
+    """
+    corners_m, mount = robot.footprint.points_m, lidar.mount
+    front_m = float(corners_m[:, 0].max()) if len(corners_m) else robot.radius_m
+    shown_m = mount.x_m + min(lidar.max_range_m, dense_m(robot.footprint.inner_radius_m, lidar.beam_step_rad))
+    if shown_m <= front_m:
+        raise InputError(
+            f"{needed_by}: expected a laser that shows the ground before the body, {front_m:.2f} m ahead of "
+            f"the axle, found one that does up to {shown_m:.2f} m, by a reach of {lidar.max_range_m:g} m and "
+            f"{lidar.beams} beams {lidar.beam_step_rad:.2g} rad apart; take more of them, or a longer reach"
+        )
+    braking, reacts_s = limits.deceleration_m_s2, max(robot.dt_s, 1.0 / lidar.rate_hz) + limits.delay_s
+    fastest = braking * (math.sqrt(reacts_s**2 + 2.0 * (shown_m - front_m) / braking) - reacts_s)
+    return replace(limits, speed_m_s=min(limits.speed_m_s, fastest))
 
 
 def polygon_around(footprint: Footprint) -> FloatArray:

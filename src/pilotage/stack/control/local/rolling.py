@@ -17,7 +17,7 @@ from pilotage.kernels.control.motion_limits import Drive
 from pilotage.kernels.geometry.motion import wrap
 from pilotage.kernels.grids.distance import nearest_marked
 from pilotage.stack.control.local.answer import Answer
-from pilotage.stack.control.local.body import make_body
+from pilotage.stack.control.local.body import dense_m, make_body
 from pilotage.stack.control.local.role import LocalLimits, LocalView
 from pilotage.stack.control.local.rolling_config import PEOPLE_FADE_HITS, RollingConfig
 from pilotage.stack.control.local.time_to_go import TimeToGo
@@ -181,6 +181,7 @@ class RollingGround:
             step,
             view.max_range_m,
             config.reach_m,
+            dense_m(body.inner_m, step),
             still,
             body.polygon,
             0.0 if self._tracks else INSIDE_M,
