@@ -84,6 +84,16 @@ def test_several_goals_are_visited_in_order() -> None:
     assert told.said["mode"] == Mode.ARRIVED
 
 
+def test_who_goes_around_nobody_says_so_among_others() -> None:
+    """Two that came towards each other collided, and no word of it."""
+    for mates, said in ((0, []), (1, ["another robot drives about"]), (3, ["3 others drive about"])):
+        told = told_of(start=START)
+        told = replace(told, task=replace(told.task, mates=mates))
+        navigator(told, Stub(told.initial))
+        words = [event.text for event in told.journal.events if event.kind == "mates-unseen"]
+        assert [word.split(",")[0] for word in words] == said
+
+
 def test_a_robot_that_starts_lost_plans_once_it_knows_where_it_is() -> None:
     lost = Belief.anywhere(ROOM.bounds_m)
     told = told_of(initial=lost)

@@ -83,6 +83,11 @@ class GoalNavigator:
             config, robot, task, parts, own_map, plan, parts.local_planner, parts.controller, journal
         )
         self._state: State = first_state(self._context, self.belief)
+        if task.mates and parts.mapper is None:
+            others = "another robot drives" if task.mates == 1 else f"{task.mates} others drive"
+            journal.say(
+                0.0, "mates-unseen", f"{others} about, and without stack.mapper it goes around nobody"
+            )
 
     @property
     def belief(self) -> Belief:
