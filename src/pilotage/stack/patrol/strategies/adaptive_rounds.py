@@ -34,7 +34,7 @@ class AdaptiveRoundsConfig(Config):
     Rounds are looked for whose worst idleness plus ``mean_weight`` times their mean is little; the worst of
     one that several robots share counts ``sharing_cost`` more there and its mean half of that. Of the plans
     found the one is taken whose forecast is best: its worst plus ``forecast_mean_weight`` times its mean,
-    ``sharing_cost`` of that more where robots share a round, for what no forecast knows of. In a forecast
+    ``forecast_sharing_cost`` of that more where robots share a round, for what it does not know. In it
     legs take up to ``late_ratio`` longer at random, who has waited before a passage that has room for one
     takes ``meeting_m`` of driving longer, and turning back takes ``late_m`` more than data sheets say, for
     decisions are made a few times a second. A round on which robots are nearer to each other than
@@ -49,6 +49,7 @@ class AdaptiveRoundsConfig(Config):
     mean_weight: NonNegative = 2.0
     sharing_cost: NonNegative = 0.06
     forecast_mean_weight: NonNegative = 0.5
+    forecast_sharing_cost: NonNegative = 0.03
     late_ratio: NonNegative = 0.25
     meeting_m: NonNegative = 2.5
     late_m: NonNegative = 0.4
@@ -92,7 +93,7 @@ def best_plan(setting: PatrolSetting, robots: int, config: AdaptiveRoundsConfig)
 
     def cost(plan: Plan) -> tuple[bool, float]:
         worst_m, mean_m = forecast_m(plan, graph, setting.passages, driving)
-        sharing = config.sharing_cost if max(plan.sizes) > 1 else 0.0
+        sharing = config.forecast_sharing_cost if max(plan.sizes) > 1 else 0.0
         together = zip(plan.rounds, plan.sizes, strict=True)
         is_crowded = any(
             size > 1 and 0.0 < walk.length_m < size * config.headway_m for walk, size in together
