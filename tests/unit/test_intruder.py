@@ -103,3 +103,13 @@ class TestMuseum:
         assert not silent["detected"]
         assert silent["detection_time_s"] is None or math.isnan(silent["detection_time_s"])
         assert silent["false_alarms"] == silent["collisions"] == 0
+
+
+class TestInADoor:
+    @pytest.mark.parametrize("seed", [1, 8])
+    def test_who_meets_him_in_a_door_lets_him_through_and_goes_on(self, seed: int) -> None:
+        """It stood in the door from then on, towards a place behind him, and he before it."""
+        walls = [[0, 0, 14, 0], [14, 0, 14, 6], [14, 6, 0, 6], [0, 6, 0, 0], [7, 0, 7, 2.5], [7, 3.5, 7, 6]]
+        metrics = judged(seed, 200.0, "team.size=1", f"world.map={{map: two-rooms, walls_m: {walls}}}")
+        assert metrics["idleness_worst_s"] < 60.0
+        assert metrics["collisions"] == 0

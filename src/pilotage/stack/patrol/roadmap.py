@@ -22,6 +22,8 @@ OFF_RATIO, AHEAD_M = 1.8, 3.5
 """Who waits beside a passage stands so many half widths of two off its axis, or so far before it."""
 FINER, MOST_NODES = (1, 2, 4), 2_000_000
 """Nodes may lie beside a passage that the body just fits through: then they lie so many times as near."""
+NEARER_M = 0.05
+"""Who leaves somebody may come so much nearer: nodes lie beside where it is."""
 NEAREST = 6
 MOST_FIELD_BYTES = 256_000_000
 """Of fields that are kept; beyond that who was not asked for longest is worked out again."""
@@ -247,14 +249,13 @@ class Roadmap:
         Parameters
         ----------
         keep_m
-            To keep from the other.
+            To keep from the other; as near as it is already is allowed.
         pass_m
             Half the width of what has room for two.
         """
         places = self._nodes_xy_m()
-        slow = self.slowness.copy()
-        slow[np.hypot(*(places - other_xy_m).transpose(2, 0, 1)) < keep_m] = np.inf
-        time = self._from(x_m, y_m, slow)
+        free = self._without(np.array(other_xy_m), x_m, y_m, keep_m)
+        time = self._from(x_m, y_m, np.where(free, self.slowness, np.inf))
         ends = np.where(self._room_m >= pass_m, time, np.inf)
         best = np.unravel_index(int(np.argmin(ends)), ends.shape)
         if not math.isfinite(ends[best]):
@@ -273,6 +274,7 @@ class Roadmap:
         bodies_xy_m: FloatArray,
         pass_m: float,
         keep_m: float,
+        met_xy_m: FloatArray | None = None,
     ) -> FloatArray | None:
         """(rows, columns) time to the nearest place where nobody stands who is in the way of who comes out.
 
@@ -287,14 +289,18 @@ class Roadmap:
             (K, 2) of others, to keep ``keep_m`` from.
         pass_m
             Half the width of what has room for two, and the distance to keep from the axis.
+        met_xy_m
+            (2,) of who is met: the path leads away from there, be it through a passage; without it through
+            none.
         """
         wide = np.isfinite(self.slowness) & (self._room_m >= pass_m)
         axis = outwards / max(float(np.hypot(*outwards)), 1e-9)
-        row, column = self._node(x_m, y_m)
-        x, y = (x_m, y_m) if wide[row, column] else (mouth_xy_m + STEP_M * axis).tolist()
-        time = self._from(x, y, np.where(wide, self.slowness, np.inf))
+        ground = wide if met_xy_m is None else self._without(met_xy_m, x_m, y_m, pass_m)
+        starts_here = met_xy_m is not None or wide[self._node(x_m, y_m)]
+        x, y = (x_m, y_m) if starts_here else (mouth_xy_m + STEP_M * axis).tolist()
+        time = self._from(x, y, np.where(ground, self.slowness, np.inf))
         # Not close to a wall: there it would take long to come to, and away from.
-        fit = np.isfinite(time) & (self.slowness < 1.2 * self.slowness.min())
+        fit = wide & np.isfinite(time) & (self.slowness < 1.2 * self.slowness.min())
         rows, columns = np.nonzero(fit)
         places = np.column_stack([columns, rows]) * self.spacing_m + np.array(self.origin_xy_m)
         offset = places - mouth_xy_m
@@ -313,6 +319,19 @@ class Roadmap:
         best = int(np.argmin(np.where(clear, when, np.inf))) if clear.any() else _farthest(free, away)
         x, y = places[best].tolist()
         return self.field_to(x, y)
+
+    def _without(self, other_xy_m: FloatArray, x_m: float, y_m: float, keep_m: float) -> BoolArray:
+        """(rows, columns) where one at a place may go who keeps from another.
+
+        Who is nearer to it already goes away from it: nothing leads on beside who is met.
+        """
+        nodes, here = self._nodes_xy_m(), np.array([x_m, y_m])
+        here_m = math.dist(other_xy_m, here)
+        away_m = np.hypot(*(nodes - other_xy_m).transpose(2, 0, 1))
+        free: BoolArray = np.isfinite(self.slowness) & (away_m >= min(keep_m, here_m))
+        if here_m < keep_m:
+            free &= (away_m >= 2.0 * keep_m) | ((nodes - here) @ (other_xy_m - here) <= NEARER_M * here_m)
+        return free
 
     def field_to(self, x_m: float, y_m: float) -> FloatArray:
         """(rows, columns) time to go to any place."""

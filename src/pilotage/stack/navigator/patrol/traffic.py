@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from pilotage.core.types import FloatArray
-from pilotage.kernels.control import eikonal
+from pilotage.kernels.control import disc_returns, eikonal
 from pilotage.stack.navigator.patrol.context import Context
 from pilotage.stack.navigator.patrol.passage import CLAIM_M, Stretch, claimed, precedes, relation, stretch_of
 from pilotage.stack.patrol.roadmap import STEP_M
@@ -28,6 +28,8 @@ WAIT_M_S = 0.1
 SEVERAL = 2
 TIE_M = 0.5
 """What differs by less is as far for both."""
+AT_IT = 0.8
+"""Cosine of the angle between a path and where somebody near is seen: such a path leads up to him."""
 MOUTH_M = 1.2
 """Who is this near to where a passage begins, and nearer than oneself, goes first."""
 
@@ -175,14 +177,13 @@ def has_less_far(context: Context, stretch: Stretch) -> tuple[bool, FloatArray |
         return False, None
     x, y = bodies[int(np.argmin(away))].tolist()
     # Nothing leads past it: the passage has room for one.
-    keep_m = min(context.pass_m, float(away.min()) - 0.2)
-    own = roadmap.way_out(pose.x_m, pose.y_m, (x, y), keep_m, context.pass_m)
-    theirs = roadmap.way_out(x, y, (pose.x_m, pose.y_m), keep_m, context.pass_m)
+    own = roadmap.way_out(pose.x_m, pose.y_m, (x, y), context.pass_m, context.pass_m)
+    theirs = roadmap.way_out(x, y, (pose.x_m, pose.y_m), context.pass_m, context.pass_m)
     own_m, their_m = (math.inf if out is None else out.time_s * context.speed_m_s for out in (own, theirs))
     if own is None:
         return False, None
     goes = own_m < their_m if not abs(own_m - their_m) <= TIE_M else bool(context.rng.random() < 0.5)
-    return goes, refuge(context, own.mouth_xy_m, own.outwards)
+    return goes, refuge(context, own.mouth_xy_m, own.outwards, np.array([x, y]))
 
 
 def retreat(context: Context, stretch: Stretch) -> FloatArray | None:
@@ -194,13 +195,20 @@ def retreat(context: Context, stretch: Stretch) -> FloatArray | None:
     return None if out is None else refuge(context, out.mouth_xy_m, out.outwards)
 
 
-def refuge(context: Context, mouth_xy_m: FloatArray, outwards: FloatArray) -> FloatArray | None:
-    """The field to a place aside of a passage's mouth where nobody stands, as far as is seen and told."""
+def refuge(
+    context: Context, mouth_xy_m: FloatArray, outwards: FloatArray, met_xy_m: FloatArray | None = None
+) -> FloatArray | None:
+    """The field to a place aside of a passage's mouth where nobody stands, as far as is seen and told.
+
+    Away from (2,) somebody who is met.
+    """
     told = [[word.x_m, word.y_m] for _, word in context.heard() if math.isfinite(word.x_m)]
     others = np.concatenate([context.bodies_on_map(), np.array(told).reshape(-1, 2)])
     keep_m = 2.0 * context.radius_m + ROOM_M
     pose = context.pose
-    return context.roadmap.refuge(pose.x_m, pose.y_m, mouth_xy_m, outwards, others, context.pass_m, keep_m)
+    return context.roadmap.refuge(
+        pose.x_m, pose.y_m, mouth_xy_m, outwards, others, context.pass_m, keep_m, met_xy_m
+    )
 
 
 def free_place(context: Context, least: int) -> FloatArray | None:
@@ -210,7 +218,7 @@ def free_place(context: Context, least: int) -> FloatArray | None:
     if np.count_nonzero(away < context.config.watch_m) < least or context.is_narrow():
         return None
     nearest = bodies[int(np.argmin(away))]
-    return refuge(context, nearest, here - nearest)
+    return refuge(context, nearest, here - nearest, nearest)
 
 
 def way_out(context: Context) -> int:
@@ -221,7 +229,8 @@ def way_out(context: Context) -> int:
         around.discard(context.hop)
     else:
         around |= set(graph.neighbours(context.hop).tolist())
-    bearings = context.strange_on_map() - np.array([pose.x_m, pose.y_m])
+    here = np.array([pose.x_m, pose.y_m])
+    bearings = disc_returns.within(context.strange_on_map() - here, context.config.watch_m)
     bearings /= np.hypot(*bearings.T)[:, None]
     best, least = -1, math.inf
     for vertex in sorted(around):
@@ -233,6 +242,8 @@ def way_out(context: Context) -> int:
             continue
         direction = eikonal.descent(pose.x_m, pose.y_m, time, *roadmap.origin_xy_m, roadmap.spacing_m)
         toward = float(np.max(bearings @ np.array(direction), initial=0.0))
+        if toward > AT_IT:
+            continue
         cost = 3.0 * toward + float(context.rng.random())
         if cost < least:
             best, least = vertex, cost
