@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
+import numpy as np
 import pytest
 
 from pilotage.experiments.build.build import build
@@ -30,3 +32,38 @@ def test_who_failed_neither_visits_nor_sees_until_it_is_mended(*, mended: bool) 
     # Who is there at the end and failed long ago has not stayed.
     worst_s = task._visits.idleness(END_S, 0.0)[0].vertex_worst_s
     assert mended or worst_s.min() >= END_S - FAILS_S - 0.41
+
+
+def test_what_either_of_two_lasers_sees_is_seen() -> None:
+    """The floor behind a robot counted as unseen for ever where its laser in front came first."""
+    values = read_mission("museum-patrol")
+    walls = [[0, 0, 6, 0], [6, 0, 6, 5], [6, 5, 0, 5], [0, 5, 0, 0]]
+    values["world"] = {"map": {"map": "a room", "bounds_m": [0, 0, 6, 5], "walls_m": walls}}
+    values["task"] = {"name": "patrol", "duration_s": END_S}
+    values["team"] = {"size": 1, "strategy": "cyclic", "starts": [{"x_m": 3.0, "y_m": 2.5, "theta_rad": 0.0}]}
+    del values["robot"]["sensors"]["lidar"]
+    half = {"name": "lidar", "rate_hz": 5, "beams": 181, "field_of_view_rad": 3.5}
+    values["robot"]["sensors"] |= {"front": half, "back": {**half, "mount": {"theta_rad": math.pi}}}
+    experiment = build(mission_of(values, seed=0))
+    metrics: Any = experiment.task.judge(run_loop(experiment).finished).metrics
+    assert metrics["coverage_age_worst_s"] < 1.0
+
+
+def test_a_derived_graph_reckons_with_the_shortest_laser() -> None:
+    """Every place was taken to see 8 m: with lasers of 2 m a quarter of the floor was never seen."""
+
+    def vertices(laser_m: float, **derive: float) -> Any:
+        values = read_mission("museum-patrol")
+        walls = [[0, 0, 9, 0], [9, 0, 9, 7], [9, 7, 0, 7], [0, 7, 0, 0]]
+        values["world"] = {"map": {"map": "a room", "bounds_m": [0, 0, 9, 7], "walls_m": walls}}
+        values["robot"]["sensors"]["lidar"]["max_range_m"] = laser_m
+        values["task"] = {"name": "patrol", "derive": derive}
+        values["team"]["size"] = 1
+        task: Any = build(mission_of(values, seed=0)).task
+        return task.patrol.graph.vertices_xy_m, task._floor.cells_xy_m
+
+    places, cells = vertices(2.0)
+    away_m = np.hypot(*(cells[:, None] - places).transpose(2, 0, 1)).min(axis=1)
+    assert away_m.max() <= 2.0  # also from half a metre beside each place
+    assert len(vertices(9.0)[0]) == len(vertices(20.0)[0]) == 1
+    assert len(vertices(2.0, reach_m=8.0)[0]) == 1  # what is said stands

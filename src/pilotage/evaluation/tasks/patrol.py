@@ -81,9 +81,13 @@ class PatrolTask:
             )
         self._config, self._names = config, [robot.name for robot in mission.members]
         self._chart = setting.chart
-        self._site, graph = _site(config, setting)
         # From the vertices of a derived graph the floor is to be seen; at a given place somebody is to be.
         near_m = (0.5 if config.graph is None else 1.0) * config.visit_m
+        lidars = [_lidars(setting, index) for index in range(len(self._names))]
+        reaches_m = [max(lidar.max_range_m for lidar in own) for own in lidars if own]
+        self._reach_m = max(reaches_m, default=0.0)
+        least_m = min(reaches_m, default=math.inf)
+        self._site, graph = _site(config, setting, max(least_m - near_m, 0.5 * least_m))
         radius_m = max(footprint.radius_m for footprint in setting.footprints)
         passages = _PASSAGES.get(
             setting.chart,
@@ -96,8 +100,7 @@ class PatrolTask:
         self.columns, self.goals = {}, ()
         self.events: list[Event] = []
         self._visits = VisitLog(graph.vertices_xy_m, config.visit_m, len(self._names))
-        self._lidars = [_lidar(setting, index) for index in range(len(self._names))]
-        self._eyes = [None if lidar is None else Eye.of(lidar) for lidar in self._lidars]
+        self._eyes = [[Eye.of(lidar) for lidar in own] for own in lidars]
         self._floor = FloorAges(setting.chart, graph.vertices_xy_m[0], CELL_M)
         self._warm_s = min(config.warm_s, 0.25 * min(config.duration_s, mission.run.time_limit_s))
         self._failed: frozenset[str] = frozenset()
@@ -126,8 +129,8 @@ class PatrolTask:
             works = np.array([not attempt.body.stopped for attempt in attempts])
             self._visits.add(t_s, np.array([attempt.body.state[:2] for attempt in attempts]), works)
         if self._step % self._see_every == 0:
-            for attempt, eye in zip(attempts, self._eyes, strict=True):
-                if eye is not None and not attempt.body.stopped:
+            for attempt, eyes in zip(attempts, self._eyes, strict=True):
+                for eye in () if attempt.body.stopped else eyes:
                     self._floor.look(t_s, attempt.body, eye)
         if self._step % self._look_every == 0:
             self._look(t_s, attempts)
@@ -204,9 +207,8 @@ class PatrolTask:
         metrics |= self._guards.metrics(somebody=bool(run.mission.world.people))
         metrics["floor_apart_fraction"] = self._site.apart_fraction
         metrics |= self._floor.metrics(math.ceil(self._warm_s / LOOK_EVERY_S))
-        reach_m = max((lidar.max_range_m for lidar in self._lidars if lidar is not None), default=0.0)
-        if reach_m > 0.0:
-            least, enough = guards_of(self._chart, self._site, reach_m)
+        if self._reach_m > 0.0:
+            least, enough = guards_of(self._chart, self._site, self._reach_m)
             metrics |= {"static_guards_bound": least, "static_guards_enough": enough}
         return Verdict(metrics, judged.columns, {**judged.extras, **self._arrays(run)})
 
@@ -247,14 +249,14 @@ def _bound(attempt: Attempt) -> int:
     return int(said) if math.isfinite(said) else -1
 
 
-def _site(config: PatrolConfig, setting: TaskSetting) -> tuple[Floor, PatrolGraph]:
+def _site(config: PatrolConfig, setting: TaskSetting, reach_m: float) -> tuple[Floor, PatrolGraph]:
     """Where the largest of the robots can be, and the graph: of a file, its edges measured on the map, or one
-    that is derived from the map."""
+    that is derived from the map, for who sees so far from beside its vertices."""
     radius_m = max(footprint.radius_m for footprint in setting.footprints)
     start = setting.mission.start_of(setting.mission.members[0])
     inside = None if start is None else (start.x_m, start.y_m)
     if config.graph is None:
-        floor, derived = derive_drivable(setting.chart, radius_m, inside, config.derive)
+        floor, derived = derive_drivable(setting.chart, radius_m, inside, config.derive.seeing(reach_m))
         return floor, derived.graph
     floor = Floor.of(setting.chart, radius_m, inside_xy_m=inside)
     return floor, on_floor(read_patrol_graph(Path(config.graph)), floor, config.graph)
@@ -285,10 +287,8 @@ def _turn_m(setting: TaskSetting, index: int, near_m: float) -> float:
     return max(0.0, speed_m_s * max(speed_m_s / sheet.braking_m_s2, turn_s) - 2.0 * near_m)
 
 
-def _lidar(setting: TaskSetting, index: int) -> LidarConfig | None:
-    """A robot's scanner."""
-    for choice in setting.mission.members[index].sensors.values():
-        if choice.name == "lidar":
-            config = SENSORS.configure(choice.name, choice.parameters, "lidar")
-            return config if isinstance(config, LidarConfig) else None
-    return None
+def _lidars(setting: TaskSetting, index: int) -> list[LidarConfig]:
+    """A robot's scanners."""
+    sensors = setting.mission.members[index].sensors.items()
+    sheets = [SENSORS.configure(choice.name, choice.parameters, name) for name, choice in sensors]
+    return [sheet for sheet in sheets if isinstance(sheet, LidarConfig)]

@@ -26,6 +26,8 @@ MOST_PAIRS = 30_000_000
 MOST_VERTICES = 400
 ON_WALL = 0.6
 """Cells: the field of distances is sampled, and never quite 0."""
+FAR_M = 8.0
+"""As far as a vertex is taken to see by lasers that see farther."""
 CLOSE_M, CLOSE_EVERY_M = 1.5, 0.1
 """What is seen from none of the places to look from is looked at from so near, by places so near together."""
 
@@ -36,8 +38,9 @@ ROOMY_CELLS_M = 0.1, 0.05
 class DerivationConfig(Config):
     """How a graph is laid over a floor."""
 
-    reach_m: Positive = 8.0
-    """As far as a vertex is taken to see: the laser's range, or less for more vertices."""
+    reach_m: Positive | None = None
+    """As far as a vertex is taken to see: the laser's range, or less for more vertices; None: 8 m, or what is
+    left of the range of the team's shortest laser where somebody passes the vertex, if that is less."""
     door_width_m: Positive = 2.0
     """Passages narrower than this between wider places are doors."""
     apart_m: Positive = 1.0
@@ -48,6 +51,15 @@ class DerivationConfig(Config):
     room_m: NonNegative = 0.1
     """Beyond the largest body, of the places and passages that the graph counts on: more than a navigator's
     margin, so that what is derived can be driven."""
+
+    @property
+    def sees_m(self) -> float:
+        """How far a vertex is taken to see."""
+        return FAR_M if self.reach_m is None else self.reach_m
+
+    def seeing(self, reach_m: float) -> DerivationConfig:
+        """The same for who sees so far; what is said of it stands."""
+        return self if self.reach_m is not None else self.model_copy(update={"reach_m": min(FAR_M, reach_m)})
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -96,11 +108,11 @@ def derive_graph(world: WorldMap, floor: Floor, config: DerivationConfig | None 
 
 def _derive_graph(world: WorldMap, floor: Floor, config: DerivationConfig) -> Derived:
     """The same, worked out."""
-    least = np.count_nonzero(floor.swept) * floor.cell_m**2 / (math.pi * config.reach_m**2)
+    least = np.count_nonzero(floor.swept) * floor.cell_m**2 / (math.pi * config.sees_m**2)
     if least > MOST_VERTICES:  # before the work that it would be
         raise _too_many(world, math.ceil(least))
     rooms, doors_xy_m = _rooms_and_doors(floor, config.door_width_m)
-    stand, points, sees = views(world, floor, config.reach_m, config.stand_every_m, config.see_every_m)
+    stand, points, sees = views(world, floor, config.sees_m, config.stand_every_m, config.see_every_m)
     covered = np.zeros(len(points), np.bool_)
     # Between places that see as much, the one farther from walls: others pass, and people do.
     rows, columns = floor.cells_of(stand)
@@ -112,7 +124,7 @@ def _derive_graph(world: WorldMap, floor: Floor, config: DerivationConfig) -> De
     if not covered.all():
         # Corners behind jambs: somebody has to look into them from nearby.
         near = _thinned(_beside(floor, points[~covered]), floor, CLOSE_EVERY_M)
-        close = seen_from(floor.middles(near), config.reach_m, points[~covered], BEAMS, *_solid(world))
+        close = seen_from(floor.middles(near), config.sees_m, points[~covered], BEAMS, *_solid(world))
         few = greedy_cover(close, floor.clearance_m[near], np.zeros(close.shape[1], np.bool_))
         vertices = np.vstack([vertices, floor.middles(near)[few]])
         covered[~covered] = close.any(axis=0)
@@ -130,7 +142,7 @@ def _derive_graph(world: WorldMap, floor: Floor, config: DerivationConfig) -> De
 def _too_many(world: WorldMap, vertices: float) -> InputError:
     return InputError(
         f"patrol graph of '{world.name}': expected at most {MOST_VERTICES} vertices, found {vertices:g} or "
-        "more; take a larger reach_m"
+        "more; take a larger task.derive.reach_m"
     )
 
 
