@@ -124,7 +124,8 @@ def test_our_stack_drives_over_topics() -> None:
 def test_increments_survive_the_way_through_poses() -> None:
     rng = np.random.default_rng(0)
     for values in rng.uniform(-0.3, 0.3, (50, 3)):
-        increment = OdometryIncrement(*map(float, values))
+        ahead_m, turn_rad, left_m = values.tolist()
+        increment = OdometryIncrement(ahead_m, turn_rad, left_m)
         before = pl.Pose2(*map(float, rng.uniform(-2.0, 2.0, 3)))
         back = _increment(before, before.compose(moved(increment)))
         assert (back.distance_m, back.angle_rad, back.lateral_m) == pytest.approx(tuple(values))
