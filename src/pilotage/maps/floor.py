@@ -25,6 +25,8 @@ CELLS_A_PASS = 4
 """The least that tell whether a pass went beside another one."""
 FINE_CELLS = 12
 """Cells a pass that tell what is swept; larger floors take coarser ones."""
+THIN_CELLS = 0.75
+"""So many cells from walls: between two cells of which no wall lies."""
 SNAP_M = 0.5
 """A place whose cell is too near to a wall stands for the nearest one that is not, this near."""
 
@@ -173,6 +175,15 @@ class Floor:
         """Share of all that the centre could be on that no passage joins to ``reachable``."""
         fits = np.count_nonzero(self.clearance_m >= self.radius_m)
         return 1.0 - np.count_nonzero(self.reachable) / max(int(fits), 1)
+
+    @property
+    def cut_off_fraction(self) -> float:
+        """Share of where the centre could be, and a thin body comes to, that no passage so wide leads to."""
+        pieces, _ = scipy.ndimage.label(self.clearance_m > THIN_CELLS * self.cell_m)
+        joined = np.unique(pieces[self.reachable])
+        fits = np.isin(pieces, joined[joined > 0]) & (self.clearance_m >= self.radius_m)
+        reached, there = np.count_nonzero(fits & self.reachable), np.count_nonzero(fits)
+        return 1.0 - int(reached) / max(int(there), 1)
 
     @cached_property
     def swept(self) -> BoolArray:

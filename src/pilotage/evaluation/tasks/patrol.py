@@ -18,6 +18,7 @@ from pilotage.evaluation.finished import FinishedRun, RobotRun, Verdict
 from pilotage.evaluation.floor_ages import Eye, FloorAges
 from pilotage.evaluation.guard_log import GuardLog
 from pilotage.evaluation.guards import guards_of
+from pilotage.evaluation.narrow_passages import cut_off
 from pilotage.evaluation.patrol_visits import VisitLog
 from pilotage.evaluation.stuck_watch import StuckWatch
 from pilotage.evaluation.tasks.task import TASKS, Attempt, TaskSetting
@@ -98,7 +99,7 @@ class PatrolTask:
         turn_m = max(_turn_m(setting, index, near_m) for index in range(len(self._names)))
         self.patrol = PatrolSite(graph, config.visit_m, near_m, starts_m, passages, turn_m)
         self.columns, self.goals = {}, ()
-        self.events: list[Event] = []
+        self.events: list[Event] = cut_off(self._site)
         self._visits = VisitLog(graph.vertices_xy_m, config.visit_m, len(self._names))
         self._eyes = [[Eye.of(lidar) for lidar in own] for own in lidars]
         self._floor = FloorAges(setting.chart, graph.vertices_xy_m[0], CELL_M)

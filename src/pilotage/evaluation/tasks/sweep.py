@@ -13,6 +13,7 @@ from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray
 from pilotage.evaluation.driving import driving_metrics, header
 from pilotage.evaluation.finished import FinishedRun, RobotRun, Verdict
+from pilotage.evaluation.narrow_passages import cut_off
 from pilotage.evaluation.tasks.task import TASKS, Attempt, TaskSetting
 from pilotage.evaluation.tasks.watched import WatchedTask
 from pilotage.kernels.patrol.swept import mark_swept
@@ -63,6 +64,7 @@ class SweepTask(WatchedTask):
         floor = Floor.of(setting.chart, radius_m, cell_m, place, exact=True)
         # By two cells less than a pass reaches: cells tell where a passage becomes narrow no better.
         self._floor = floor.roomy(config.spare_m, 0.5 * self._width_m - 2.0 * floor.cell_m, place)
+        self.events += cut_off(floor)
         self._swept: BoolArray = np.zeros_like(self._floor.reachable)
         self._last = np.array([start.x_m, start.y_m])
 

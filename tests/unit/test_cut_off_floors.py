@@ -1,0 +1,42 @@
+"""Floors that passages are too narrow for are told."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from pilotage.evaluation.narrow_passages import cut_off
+from pilotage.experiments.build.build import build
+from pilotage.experiments.mission import mission_of, read_mission
+from pilotage.maps.floor import Floor
+from support.patrol_floors import walled, with_door
+
+
+@pytest.mark.parametrize(("radius_m", "share"), [(0.2, 0.0), (0.4, 0.0), (0.6, 0.5)])
+def test_a_room_behind_a_door_that_is_too_narrow_is_left_out(radius_m: float, share: float) -> None:
+    floor = Floor.of(with_door(1.0), radius_m, inside_xy_m=(2.0, 2.5))
+    assert floor.cut_off_fraction == pytest.approx(share, abs=0.02)
+    told = [event.text for event in cut_off(floor)]
+    assert len(told) == (share > 0.0)
+    assert all("a body 1.20 m across" in text for text in told)
+
+
+def test_what_nobody_could_come_to_is_not_left_out() -> None:
+    """A closed room is no floor behind a narrow passage."""
+    floor = Floor.of(walled(8, 5, (4, 0, 4, 5)), 0.3, inside_xy_m=(2.0, 2.5))
+    assert floor.apart_fraction == pytest.approx(0.5, abs=0.05)
+    assert floor.cut_off_fraction == 0.0
+    assert cut_off(floor) == []
+
+
+@pytest.mark.parametrize(("door_m", "told"), [(0.5, ["cut-off"]), (1.2, [])])
+def test_a_patrol_that_leaves_half_of_the_floor_out_says_so(door_m: float, told: list[str]) -> None:
+    values, half_m = read_mission("museum-patrol"), 0.5 * door_m
+    walls = [[0.0, 0.0, 8.0, 0.0], [8.0, 0.0, 8.0, 5.0], [8.0, 5.0, 0.0, 5.0], [0.0, 5.0, 0.0, 0.0]]
+    walls += [[4.0, 0.0, 4.0, 2.5 - half_m], [4.0, 2.5 + half_m, 4.0, 5.0]]
+    values["world"] = {"map": {"map": "two rooms", "bounds_m": [0, 0, 8, 5], "walls_m": walls}}
+    values["team"] = {"size": 1, "strategy": "cyclic"}
+    values["task"] = {"name": "patrol", "duration_s": 1.0}
+    task: Any = build(mission_of(values, seed=0)).task
+    assert [event.kind for event in task.events] == told
