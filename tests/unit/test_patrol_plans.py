@@ -11,8 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pilotage.kernels.patrol.rounds import BACK, judge_walk, plan_cost
+from pilotage.stack.patrol.forecast import forecast_m
 from pilotage.stack.patrol.graph import PatrolGraph
 from pilotage.stack.patrol.partition import Plan, annealed, even_sizes, partition
+from pilotage.stack.patrol.passages import Passages
+from pilotage.stack.patrol.shut_paths import NONE_SHUT, OpenGraph, ShutPaths
 from pilotage.stack.patrol.strategies.adaptive_rounds import (
     AdaptiveRoundsConfig,
     best_plan,
@@ -125,3 +128,17 @@ def test_who_hears_nobody_shares_fewer_rounds() -> None:
     assert best_plan(talking, 4, AdaptiveRoundsConfig()).sizes == (4,)
     assert best_plan(deaf, 4, AdaptiveRoundsConfig()).sizes == (1, 1, 1, 1)
     assert best_plan(deaf, 4, AdaptiveRoundsConfig(late_ratio=0.0)).sizes == (4,)
+
+
+@pytest.mark.parametrize("shut", [NONE_SHUT, ShutPaths(unreached=(3,))])
+def test_plans_for_who_is_left_are_forecast_once_for_all_robots(shut: ShutPaths) -> None:
+    """Each of them drove every plan on paper anew."""
+    graph, passages = ring(), Passages()
+    before = forecast_m.cache_info().misses
+    for robot in range(4):
+        left = OpenGraph.of(graph, passages, shut)
+        setting = replace(setting_for(ring(), (0, 2, 4)), robot=robot % 3, passages=left.passages)
+        best_plan(replace(setting, graph=left.graph), 3, AdaptiveRoundsConfig(meeting_m=1.25))
+        if robot == 0:
+            first = forecast_m.cache_info().misses
+    assert forecast_m.cache_info().misses == first > before

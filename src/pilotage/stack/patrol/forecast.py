@@ -55,7 +55,7 @@ class Driving:
     talks: bool
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=1024)
 def forecast_m(plan: Plan, graph: PatrolGraph, passages: Passages, driving: Driving) -> tuple[float, float]:
     """Worst and mean idleness times speed, on average over a few times; the same for whoever asks.
 

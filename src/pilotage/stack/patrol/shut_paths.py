@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -114,8 +115,12 @@ class OpenGraph:
     places: IntArray
 
     @staticmethod
+    @lru_cache(maxsize=64)
     def of(graph: PatrolGraph, passages: Passages, shut: ShutPaths) -> OpenGraph:
-        """Leave out what is not reached, and where it is narrow on edges that lead elsewhere now."""
+        """Leave out what is not reached, and where it is narrow on edges that lead elsewhere now.
+
+        The same one for whoever asks: what was forecast of plans on it is, too.
+        """
         places = shut.reached(len(graph))
         edges_m = graph.edges_m.copy()
         longer = set()
