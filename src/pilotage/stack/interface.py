@@ -115,6 +115,27 @@ class Stack(Protocol):
         ...
 
 
+class WrappedStack:
+    """A stack around another one: whoever is one says what it does otherwise."""
+
+    def __init__(self, stack: Stack) -> None:
+        self._stack = stack
+
+    @property
+    def belief(self) -> Belief:
+        """The stack's."""
+        return self._stack.belief
+
+    @property
+    def status(self) -> tuple[StackStatus, str]:
+        """The stack's."""
+        return self._stack.status
+
+    def step(self, readings: Readings) -> Command:
+        """One control step of the stack."""
+        return self._stack.step(readings)
+
+
 LEAST_EIGENVALUE = -1e-9
 """Of a covariance, as a share of its largest: what rounding may leave below zero."""
 

@@ -6,9 +6,8 @@ the programmed route of the night watch's filter experiments (report figures 15-
 
 from __future__ import annotations
 
-from pilotage.core.types import Command
 from pilotage.sensors.readings import Readings
-from pilotage.stack.interface import Belief, Stack, StackStatus
+from pilotage.stack.interface import Belief, Stack, WrappedStack
 from pilotage.stack.localization.localizer import Localizer
 
 
@@ -38,23 +37,14 @@ class WatchedLocalizer:
         return self._driver.step(readings)
 
 
-class WatchedStack:
+class WatchedStack(WrappedStack):
     """A stack that drives on its driver's belief and tells that of the localizer which is watched."""
 
     def __init__(self, stack: Stack, watched: Localizer) -> None:
-        self._stack = stack
+        super().__init__(stack)
         self._watched = watched
 
     @property
     def belief(self) -> Belief:
         """What the watched localizer believes."""
         return self._watched.belief
-
-    @property
-    def status(self) -> tuple[StackStatus, str]:
-        """The stack's."""
-        return self._stack.status
-
-    def step(self, readings: Readings) -> Command:
-        """One control step."""
-        return self._stack.step(readings)

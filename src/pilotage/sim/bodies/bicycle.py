@@ -10,7 +10,8 @@ from pilotage.core.random import RandomStreams
 from pilotage.core.types import Command
 from pilotage.kernels.bodies.drive import CONTACT_M
 from pilotage.models.motion.bicycle import BicycleConfig
-from pilotage.sim.bodies.motion import SIMULATED_MOTIONS, approach, as_twist
+from pilotage.models.motion.rates import approach
+from pilotage.sim.bodies.motion import SIMULATED_MOTIONS, as_twist
 
 
 @SIMULATED_MOTIONS.add(BicycleConfig)

@@ -94,9 +94,3 @@ def as_twist(command: Command, motion: str) -> Twist:
     if type(command) is Twist:
         return command
     raise InputError(f"{motion}: expected a twist as command, found {type(command).__name__}")
-
-
-def approach(current: float, wanted: float, limit: float, change: float) -> float:
-    """Move ``current`` towards ``wanted`` by at most ``change``, within +-limit."""
-    target = min(max(wanted, -limit), limit)
-    return min(max(target, current - change), current + change)

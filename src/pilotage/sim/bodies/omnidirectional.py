@@ -8,7 +8,8 @@ from pilotage.core.random import RandomStreams
 from pilotage.core.types import Command
 from pilotage.kernels.bodies.drive import CONTACT_M
 from pilotage.models.motion.omnidirectional import OmnidirectionalConfig
-from pilotage.sim.bodies.motion import SIMULATED_MOTIONS, approach, as_twist
+from pilotage.models.motion.rates import approach
+from pilotage.sim.bodies.motion import SIMULATED_MOTIONS, as_twist
 
 
 @SIMULATED_MOTIONS.add(OmnidirectionalConfig)

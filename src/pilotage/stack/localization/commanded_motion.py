@@ -7,9 +7,10 @@ from collections import deque
 
 from pilotage.core.types import STOP, Command, Twist
 from pilotage.models.motion.motion import MotionConfig
+from pilotage.models.motion.rates import approach
 from pilotage.models.motion.wheel_drive import WheelDriveConfig
 from pilotage.sensors.readings import OdometryIncrement, Readings
-from pilotage.stack.interface import Belief, Stack, StackStatus
+from pilotage.stack.interface import Stack, WrappedStack
 
 EPSILON_S = 1e-9
 
@@ -49,7 +50,7 @@ class CommandedMotion:
             if u.v_m_s != 0.0:
                 tightest = 1.0 / motion.least_turning_radius_m
                 change = motion.curvature_rate_per_m_s * dt_s
-                self._curvature = _approach(self._curvature, u.w_rad_s / u.v_m_s, tightest, change)
+                self._curvature = approach(self._curvature, u.w_rad_s / u.v_m_s, tightest, change)
             return OdometryIncrement(ahead_m, self._curvature * ahead_m, left_m)
         change = motion.turn_acceleration_rad_s2 * dt_s
         self._w, turn_rad = self._follow(self._w, u.w_rad_s, motion.top_turn_rate_rad_s, change, dt_s)
@@ -59,28 +60,19 @@ class CommandedMotion:
         self, rate: float, wanted: float, limit: float, change: float, dt_s: float
     ) -> tuple[float, float]:
         """A rate after a step, and what it made in it."""
-        lag_s, target = self._motion.lag_s, _approach(rate, wanted, limit, change)
+        lag_s, target = self._motion.lag_s, approach(rate, wanted, limit, change)
         if lag_s == 0.0:
             return target, target * dt_s
         kept = math.exp(-dt_s / lag_s)
         return target + (rate - target) * kept, target * dt_s + (rate - target) * lag_s * (1.0 - kept)
 
 
-class CommandedStack:
+class CommandedStack(WrappedStack):
     """A stack whose commands a model of its robot is told of."""
 
     def __init__(self, stack: Stack, commanded: CommandedMotion) -> None:
-        self._stack, self._commanded = stack, commanded
-
-    @property
-    def belief(self) -> Belief:
-        """The stack's."""
-        return self._stack.belief
-
-    @property
-    def status(self) -> tuple[StackStatus, str]:
-        """The stack's."""
-        return self._stack.status
+        super().__init__(stack)
+        self._commanded = commanded
 
     def step(self, readings: Readings) -> Command:
         """One control step."""
@@ -104,9 +96,3 @@ def _as_twist(command: Command, motion: MotionConfig) -> Twist:
         for speed in (command.left_rad_s, command.right_rad_s)
     )
     return Twist(0.5 * (left + right), (right - left) / separation_m)
-
-
-def _approach(current: float, wanted: float, limit: float, change: float) -> float:
-    """Move towards what is wanted by at most ``change``, within +-limit."""
-    target = min(max(wanted, -limit), limit)
-    return target if math.isinf(change) else min(max(target, current - change), current + change)

@@ -14,7 +14,7 @@ from pilotage.sensors.joint_lidar import JointLidarConfig, joint_lidar
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, Readings
 from pilotage.sensors.sensor import SensorConfig
-from pilotage.stack.interface import Belief, Stack, StackStatus
+from pilotage.stack.interface import Stack, WrappedStack
 from pilotage.stack.knowledge import RobotKnowledge
 
 LEAST_STD_M = 0.0025
@@ -87,21 +87,12 @@ class JointScan:
         )
 
 
-class JoiningStack:
+class JoiningStack(WrappedStack):
     """A stack that is handed the joint scan besides."""
 
     def __init__(self, stack: Stack, join: JointScan) -> None:
-        self._stack, self._join = stack, join
-
-    @property
-    def belief(self) -> Belief:
-        """The stack's."""
-        return self._stack.belief
-
-    @property
-    def status(self) -> tuple[StackStatus, str]:
-        """The stack's."""
-        return self._stack.status
+        super().__init__(stack)
+        self._join = join
 
     def step(self, readings: Readings) -> Command:
         """One control step."""
