@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from pilotage.core.errors import InputError
 from pilotage.core.types import Pose2
 from pilotage.experiments.build.charts import bounds_of
+from pilotage.kernels.geometry import nearest
 from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.nearest_obstacles import NearestObstacles
 from pilotage.maps.occupancy_grid import OccupancyGrid
@@ -41,6 +42,24 @@ def test_never_too_near_and_little_too_far(x: float, y: float) -> None:
 def test_exact_beside_a_wall_also_behind_the_outermost(along: float, aside: float) -> None:
     points = np.array([[10 * along, aside], [2 + 2 * along - 0.7071 * aside, 5 + 2 * along + 0.7071 * aside]])
     assert NEAREST.at(points) == pytest.approx(np.abs([aside, aside]), abs=1e-5)
+
+
+@settings(max_examples=200)
+@given(st.floats(-1, 11), st.floats(-1, 9), st.floats(0, 2), st.floats(0, 2), st.integers(0, 1000))
+def test_what_is_nearest_to_a_box_is_so_to_each_of_its_points(
+    x: float, y: float, width: float, height: float, seed: int
+) -> None:
+    box = (x, x + width, y, y + height)
+    grid = NEAREST.index, *NEAREST.origin_xy_m, NEAREST.resolution_m
+    item = nearest.item_throughout(box, *grid, 10_000)
+    share = np.random.default_rng(seed).random((50, 2))
+    px, py = x + width * share[:, 0], y + height * share[:, 1]
+    by_node = nearest.distances_by_node(px, py, *grid, NEAREST.items)
+    if item != nearest.SEVERAL:
+        assert nearest.distances_to_item(px, py, NEAREST.items, item) == pytest.approx(by_node, abs=1e-12)
+    one = nearest.item_throughout((px[0], px[0], py[0], py[0]), *grid, 1)
+    alone = nearest.distances_to_item(px[:1], py[:1], NEAREST.items, one)
+    assert alone == pytest.approx(by_node[:1], abs=1e-12)
 
 
 def grid(theta: float = 0.0) -> OccupancyGrid:

@@ -17,6 +17,7 @@ from pilotage.evaluation.driving import poses
 from pilotage.experiments.loop import simulate
 from pilotage.experiments.mission import load_mission
 from pilotage.kernels.filters import particles
+from pilotage.maps.nearest_obstacles import NearestObstacles
 from pilotage.maps.rasterize import rasterized
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.maps.world_map import WorldMap
@@ -60,6 +61,26 @@ def test_tempering_leaves_as_much_of_the_cloud_as_is_asked_for(seed: int, sharpn
     left = particles.effective_count(likelihoods, part)
     assert left >= 100.0 - 1e-6
     assert part == 1.0 or left == pytest.approx(100.0, abs=0.1)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 10_000), st.floats(0.002, 0.5), st.floats(-20.0, 5.0))
+def test_a_narrow_cloud_is_weighed_as_each_of_its_particles_alone(seed: int, width: float, at: float) -> None:
+    """One wall may be before all of them, or several, or the map's end."""
+    rng = np.random.default_rng(seed)
+    field = NearestObstacles.from_map(ROOM, 0.1)
+    poses = np.ascontiguousarray(
+        np.column_stack([rng.normal(at, width, 60), rng.normal(2.0, width, 60), rng.normal(3.1, width, 60)])
+    )
+    points, table = rng.uniform(-6.0, 6.0, (20, 2)), -np.arange(50.0)
+    together, alone_, grid = np.empty(60), np.empty(60), (*field.origin_xy_m, field.resolution_m)
+    particles.log_likelihoods(poses, points, field.index, *grid, field.items, table, 0.02, together)
+    for k in range(60):
+        c, s = math.cos(poses[k, 2]), math.sin(poses[k, 2])
+        away = field.at(poses[k, :2] + points @ np.array([[c, s], [-s, c]]))
+        alone_[k] = table[np.minimum(away / 0.02 + 0.5, 49.0).astype(int)].sum()
+    # A distance beside the border of two entries of the table may round to either.
+    assert together == pytest.approx(alone_, abs=2.0)
 
 
 @pytest.mark.parametrize("growth", [1.0, 1.5])

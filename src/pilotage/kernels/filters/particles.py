@@ -3,16 +3,51 @@
 from __future__ import annotations
 
 import math
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pilotage.kernels.arrays import FloatArray, IntArray
 from pilotage.kernels.geometry.motion import exact_arc, mid_angle, sideways, wrap
-from pilotage.kernels.geometry.nearest import distances_by_node
+from pilotage.kernels.geometry.nearest import (
+    SEVERAL,
+    distances_by_node,
+    distances_to_item,
+    item_throughout,
+)
 from pilotage.kernels.jit import kernel
 
 BISECTIONS = 40
+NODES_SHARE = 2
+"""A cloud is looked up as one where that asks for no more nodes than one for so many particles."""
+ROUNDING = 1e-12
+
+Span: TypeAlias = tuple[float, float]
+"""The least and the largest of several numbers."""
+
+
+@kernel
+def span(values: FloatArray) -> Span:
+    """Of values (N,)."""
+    low, high = math.inf, -math.inf
+    for i in range(values.shape[0]):
+        low, high = min(low, values[i]), max(high, values[i])
+    return low, high
+
+
+@kernel
+def times(values: Span, factor: float) -> Span:
+    """All of them times a factor."""
+    a, b = values[0] * factor, values[1] * factor
+    return min(a, b), max(a, b)
+
+
+@kernel
+def plus(one: Span, other: Span) -> Span:
+    """Of sums of one each, and a little more, so that none is left out by rounding."""
+    low, high = one[0] + other[0], one[1] + other[1]
+    return low - ROUNDING * abs(low), high + ROUNDING * abs(high)
 
 
 @kernel
@@ -66,21 +101,31 @@ def log_likelihoods(
     obstacle. ``table`` holds the logarithm of a beam's density at multiples of ``table_step``; its last
     entry stands for all beyond and for what is off the map.
     """
-    last = table.shape[0] - 1
-    x, y = np.empty(poses.shape[0]), np.empty(poses.shape[0])
-    c, s = np.empty(poses.shape[0]), np.empty(poses.shape[0])
-    for i in range(poses.shape[0]):
+    last, count = table.shape[0] - 1, poses.shape[0]
+    px, py, c, s = poses[:, 0].copy(), poses[:, 1].copy(), np.empty(count), np.empty(count)
+    x, y = np.empty(count), np.empty(count)
+    for i in range(count):
         c[i], s[i] = math.cos(poses[i, 2]), math.sin(poses[i, 2])
         out[i] = 0.0
+    of_x, of_y, of_c, of_s = span(px), span(py), span(c), span(s)
+    per_step = 1.0 / table_step
     # Beam by beam for all particles: what is alike for many is computed for several at once.
     for k in range(points.shape[0]):
         u, v = points[k, 0], points[k, 1]
-        for i in range(poses.shape[0]):
-            x[i] = poses[i, 0] + c[i] * u - s[i] * v
-            y[i] = poses[i, 1] + s[i] * u + c[i] * v
-        away = distances_by_node(x, y, nearest, x0, y0, resolution, items)
-        for i in range(poses.shape[0]):
-            out[i] += table[np.int64(min(away[i] / table_step + 0.5, last))]
+        for i in range(count):
+            x[i] = px[i] + c[i] * u - s[i] * v
+            y[i] = py[i] + s[i] * u + c[i] * v
+        # Of a cloud that is narrow a beam ends before the same wall for all particles.
+        low, high = plus(plus(of_x, times(of_c, u)), times(of_s, -v))
+        bottom, top = plus(plus(of_y, times(of_s, u)), times(of_c, v))
+        item = item_throughout((low, high, bottom, top), nearest, x0, y0, resolution, count // NODES_SHARE)
+        if item == SEVERAL:
+            away = distances_by_node(x, y, nearest, x0, y0, resolution, items)
+        else:
+            away = distances_to_item(x, y, items, item)
+        for i in range(count):
+            entry = away[i] * per_step + 0.5
+            out[i] += table[np.uint64(entry if entry < last else last)]
 
 
 @kernel

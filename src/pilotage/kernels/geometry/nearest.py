@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +14,11 @@ from pilotage.kernels.geometry.plane import point_segment_distance
 from pilotage.kernels.jit import kernel
 
 IndexArray = NDArray[np.int32]
+Box: TypeAlias = tuple[float, float, float, float]
+"""Least and largest x, least and largest y."""
 LEAST = 1e-300
 """In place of a squared length of 0: a segment without one is a point."""
+SEVERAL = -1
 
 
 @kernel
@@ -60,6 +64,47 @@ def nearest_items(x0: float, y0: float, resolution: float, nx: int, ny: int, ite
                         if d < best:
                             best, which = d, near[n]
                     out[row, col] = which
+    return out
+
+
+@kernel
+def node_of(value: float, begin: float, resolution: float, count: int) -> int:
+    """The node of ``count`` along an axis nearest to a coordinate; off the grid the one at its edge."""
+    return int(min(max((value - begin) / resolution + 0.5, 0.0), count - 0.5))
+
+
+@kernel
+def item_throughout(
+    box: Box, nearest: IndexArray, x0: float, y0: float, resolution: float, most_nodes: int
+) -> int:
+    """The item that is nearest to the nodes of all points in a box; ``SEVERAL`` where it is not the same.
+
+    Also where that would have to be looked up at more than ``most_nodes`` nodes.
+    """
+    ny, nx = nearest.shape
+    low, high = node_of(box[0], x0, resolution, nx), node_of(box[1], x0, resolution, nx)
+    bottom, top = node_of(box[2], y0, resolution, ny), node_of(box[3], y0, resolution, ny)
+    if (high - low + 1) * (top - bottom + 1) > most_nodes:
+        return SEVERAL
+    item = nearest[bottom, low]
+    for row in range(bottom, top + 1):
+        for col in range(low, high + 1):
+            if nearest[row, col] != item:
+                return SEVERAL
+    return item
+
+
+@kernel
+def distances_to_item(x: FloatArray, y: FloatArray, items: FloatArray, i: int) -> FloatArray:
+    """Distances (K,) from points, x (K,) and y (K,), to item i of (N, 5), as of ``distances_by_node``."""
+    out = np.empty(x.shape[0])
+    ax, ay, radius = items[i, 0], items[i, 1], items[i, 4]
+    ex, ey = items[i, 2] - ax, items[i, 3] - ay
+    per_length2 = 1.0 / max(ex * ex + ey * ey, LEAST)
+    for k in range(x.shape[0]):
+        t = min(1.0, max(0.0, ((x[k] - ax) * ex + (y[k] - ay) * ey) * per_length2))
+        dx, dy = x[k] - (ax + t * ex), y[k] - (ay + t * ey)
+        out[k] = abs(math.sqrt(dx * dx + dy * dy) - radius)
     return out
 
 
