@@ -91,7 +91,7 @@ def item_throughout(
         for col in range(low, high + 1):
             if nearest[row, col] != item:
                 return SEVERAL
-    return item
+    return int(item)
 
 
 @kernel
