@@ -9,6 +9,7 @@ from scipy.optimize import linprog
 
 from pilotage.core.types import BoolArray, FloatArray
 from pilotage.evaluation.guards import fewest_guards
+from pilotage.kernels.patrol.cover import holding_no_other
 from pilotage.kernels.patrol.visibility import seen_from
 from pilotage.kernels.scans.sight import hidden
 from pilotage.maps.floor import Floor
@@ -72,3 +73,20 @@ def test_what_others_imply_is_left_out_and_changes_no_bound() -> None:
         least, enough = fewest_guards(seen)
         assert whole.fun is not None
         assert least == math.ceil(whole.fun - 1e-6) <= enough
+
+
+def test_of_sets_those_are_kept_that_hold_no_other_one() -> None:
+    rng = np.random.default_rng(11)
+    for count, size in ((1, 1), (20, 5), (30, 64), (40, 130)):
+        sets = rng.random((count, size)) < rng.choice([0.05, 0.3, 0.9])
+        sets[count // 2] = sets[0]
+        packed = np.packbits(np.pad(sets, ((0, 0), (0, -size % 64))), axis=1).view(np.uint64)
+        kept = [
+            not any(
+                not (sets[j] & ~sets[i]).any() and (sets[j].sum() < sets[i].sum() or j < i)
+                for j in range(count)
+                if j != i and (sets[j].sum(), j) < (sets[i].sum(), i)
+            )
+            for i in range(count)
+        ]
+        assert holding_no_other(packed, sets.sum(axis=1)).tolist() == kept

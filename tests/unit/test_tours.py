@@ -147,3 +147,29 @@ def test_one_place_and_none() -> None:
             assert tour is not None
             assert tour.order == tuple(range(count))
             assert tour.cost == 0.0
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    st.integers(0, 10_000),
+    st.integers(1, 7),
+    st.sampled_from(["plane", "slope", "random"]),
+    st.booleans(),
+    st.booleans(),
+)
+def test_a_place_is_put_in_where_it_lengthens_a_tour_least(
+    seed: int, count: int, kind: str, leaves: bool, comes: bool
+) -> None:
+    costs = draw(seed, count + 1, kind)
+    np.fill_diagonal(costs, 0.0)
+    order = np.random.default_rng(seed).permutation(count)
+    out, into = int(order[seed % count]) if leaves else -1, count if comes else -1
+    left = [place for place in order.tolist() if place != out]
+    found = search.exchanged(costs, order, out, into)
+    assert [place for place in found.tolist() if place != into] == left
+    assert (into in found.tolist()) == comes
+    every = [(*left[:k], into, *left[k:]) for k in range(max(len(left), 1))] if comes else [tuple(left)]
+    best = min(cost_of(costs, other, True) if len(other) > 1 else 0.0 for other in every)
+    told = search.exchanged_cost(costs, order, out, into)
+    assert told == pytest.approx(best, abs=1e-9)
+    assert told == pytest.approx(cost_of(costs, tuple(found.tolist()), True) if len(found) > 1 else 0.0)

@@ -8,15 +8,15 @@ import numpy as np
 import scipy
 
 from pilotage.core.content import content_of
-from pilotage.core.types import BoolArray, FloatArray
-from pilotage.kernels.patrol.cover import greedy_cover
+from pilotage.core.types import BoolArray
+from pilotage.kernels.patrol.cover import greedy_cover, holding_no_other
 from pilotage.maps.floor import Floor
 from pilotage.maps.known_maps import OncePerMap
 from pilotage.maps.world_map import WorldMap
 from pilotage.stack.patrol.derive import views
 
 STAND_EVERY_M, SEE_EVERY_M = 1.0, 0.5
-BLOCK = 1024
+WORD_BYTES = 8
 
 _GUARDS: OncePerMap[tuple[int, int]] = OncePerMap()
 
@@ -61,13 +61,8 @@ def fewest_guards(sees: BoolArray) -> tuple[int, int]:
 
 def _least(sets: BoolArray) -> BoolArray:
     """(K,) which of the sets, rows of (K, N), hold no other one; of equal ones the first."""
-    rows: FloatArray = sets.astype(np.float32)
-    size, index = rows.sum(axis=1), np.arange(len(rows))
-    out = np.empty(len(rows), np.bool_)
-    for begin in range(0, len(rows), BLOCK):
-        block = slice(begin, begin + BLOCK)
-        holds = rows[block] @ rows.T == size[None, :]
-        smaller = size[None, :] < size[block, None]
-        earlier = (size[None, :] == size[block, None]) & (index[None, :] < index[block, None])
-        out[block] = ~(holds & (smaller | earlier)).any(axis=1)
-    return out
+    packed = np.packbits(sets, axis=1)
+    width = -(-packed.shape[1] // WORD_BYTES) * WORD_BYTES
+    words = np.zeros((len(sets), width), np.uint8)
+    words[:, : packed.shape[1]] = packed
+    return np.asarray(holding_no_other(words.view(np.uint64), sets.sum(axis=1)))

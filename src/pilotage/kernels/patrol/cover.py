@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pilotage.kernels.arrays import BoolArray, FloatArray, IntArray
 from pilotage.kernels.jit import kernel
@@ -52,3 +53,29 @@ def greedy_cover(sees: BoolArray, preference: FloatArray, covered: BoolArray) ->
                     if sees[p, m]:
                         gain[p] -= 1
     return chosen[:number].copy()
+
+
+@kernel
+def holding_no_other(words: NDArray[np.uint64], sizes: IntArray) -> BoolArray:
+    """(K,) which of the sets, rows of bits (K, W), hold no other one; of equal ones the first does not.
+
+    ``sizes`` (K,) is how many each holds. Nearly all pairs differ in the first word of the smaller one that
+    is not empty.
+    """
+    count, width = words.shape
+    first, out = np.zeros(count, np.int64), np.ones(count, np.bool_)
+    for i in range(count):
+        while first[i] < width and words[i, first[i]] == 0:
+            first[i] += 1
+    for i in range(count):
+        for j in range(count):
+            if sizes[j] > sizes[i] or (sizes[j] == sizes[i] and j >= i):
+                continue
+            is_held, k = True, first[j]
+            while is_held and k < width:
+                is_held = words[j, k] & ~words[i, k] == 0
+                k += 1
+            if is_held:
+                out[i] = False
+                break
+    return out

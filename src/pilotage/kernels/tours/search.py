@@ -53,6 +53,56 @@ def cheapest_insertion(costs: FloatArray) -> IntArray:
 
 
 @kernel
+def _best_gap(costs: FloatArray, order: IntArray, out: int, into: int) -> tuple[int, float]:
+    """After which of a closed tour's places (N,) another lengthens it least, and by how much.
+
+    As if ``out`` were none of them; -1, and its way there and back alone where no other is left.
+    """
+    n, least, after = order.size, math.inf, -1
+    for k in range(n):
+        a, b = order[k], order[(k + 1) % n]
+        if a == out:
+            continue
+        if b == out:
+            b = order[(k + 2) % n]
+        extra = costs[a, into] + costs[into, b] - (costs[a, b] if a != b else 0.0)
+        if extra < least:
+            least, after = extra, k
+    return after, least if after >= 0 else 0.0
+
+
+@kernel
+def exchanged_cost(costs: FloatArray, order: IntArray, out: int, into: int) -> float:
+    """Cost of ``exchanged``."""
+    n, total = order.size, tour_cost(costs, order)
+    for k in range(n):
+        if order[k] == out:
+            a, b = order[k - 1], order[(k + 1) % n]
+            total += (costs[a, b] if a != b else 0.0) - costs[a, out] - costs[out, b]
+    if n == 1 and out >= 0:
+        total = 0.0
+    return total + (_best_gap(costs, order, out, into)[1] if into >= 0 else 0.0)
+
+
+@kernel
+def exchanged(costs: FloatArray, order: IntArray, out: int, into: int) -> IntArray:
+    """A closed tour (N,) less one place, and with another where it lengthens it least; -1: none."""
+    found = np.empty(order.size + 1, np.int64)
+    after, count = _best_gap(costs, order, out, into)[0] if into >= 0 else -2, 0
+    for k in range(order.size):
+        if order[k] != out:
+            found[count] = order[k]
+            count += 1
+        if k == after:
+            found[count] = into
+            count += 1
+    if after == -1:
+        found[count] = into
+        count += 1
+    return found[:count].copy()
+
+
+@kernel
 def _reverse(order: IntArray, i: int, j: int) -> None:
     """Turn the stretch from i up to j around."""
     while i < j:

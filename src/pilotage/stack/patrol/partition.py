@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -11,7 +10,13 @@ import numpy as np
 
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.kernels.patrol.rounds import anneal, promised, visit_gaps
-from pilotage.kernels.tours.search import cheapest_insertion, improve, tour_cost
+from pilotage.kernels.tours.search import (
+    cheapest_insertion,
+    exchanged,
+    exchanged_cost,
+    improve,
+    tour_cost,
+)
 from pilotage.stack.patrol.graph import PatrolGraph
 from pilotage.stack.patrol.tours import Round
 
@@ -22,6 +27,8 @@ MOST_STEPS = 200
 SOFT_MAX = 16.0
 """Shares are levelled by this power of their lengths: nearly the longest alone, but shorter ones count."""
 BEGINNINGS = 8
+TRIED = 16
+"""Of a step's changes those are worked out that promise most."""
 NEIGHBOURS = 8
 """A vertex changes to shares of so many nearest ones."""
 CHANGES, HEATS, COLD = 20_000, (0.05, 0.1, 0.2, 0.4), 0.0005
@@ -166,59 +173,76 @@ class _Levelling:
     """Moves vertices between shares, and swaps them, while that lowers the cost."""
 
     def __init__(self, graph: PatrolGraph, sizes: tuple[int, ...]) -> None:
-        self._graph, self._sizes = graph, np.array(sizes)
+        self._costs_m, self._sizes = graph.shortest_m, np.array(sizes)
         self._near = _near(graph)
-        self._lengths: dict[frozenset[int], float] = {}
 
     def run(self, shares: list[set[int]]) -> float:
         """Change the shares in place; returns their cost, in metres."""
-        lengths = np.array([self._length(share) for share in shares])
+        orders = [_order(self._costs_m, frozenset(share)) for share in shares]
+        lengths = np.array([self._length(order) for order in orders])
         for _ in range(MOST_STEPS):
-            best = self._cost(lengths) * (1.0 - 1e-6)
-            change: tuple[int, set[int], set[int]] | None = None
-            owner = {vertex: group for group, share in enumerate(shares) for vertex in share}
             # Only the longest need give something away.
             one = int(np.argmax(lengths / self._sizes))
-            for other, mine, theirs in self._changes(one, shares, owner):
+            best = float(self._cost(lengths)) * (1.0 - 1e-6)
+            found: tuple[int, IntArray, IntArray] | None = None
+            for other, gone, come in self._promising(one, orders, lengths):
+                mine, theirs = (
+                    self._changed(orders[one], gone, come),
+                    self._changed(orders[other], come, gone),
+                )
                 new = lengths.copy()
                 new[one], new[other] = self._length(mine), self._length(theirs)
-                cost = self._cost(new)
+                cost = float(self._cost(new))
                 if cost < best:
-                    best, change = cost, (other, mine, theirs)
-            if change is None:
+                    best, found = cost, (other, mine, theirs)
+            if found is None:
                 break
-            other, shares[one], shares[other] = change
+            other, orders[one], orders[other] = found
             for group in (one, other):
-                lengths[group] = self._length(shares[group])
-        return self._cost(lengths)
+                lengths[group] = self._length(orders[group])
+        shares[:] = [set(order.tolist()) for order in orders]
+        return float(self._cost(lengths))
 
-    def _changes(
-        self, one: int, shares: list[set[int]], owner: dict[int, int]
-    ) -> Iterator[tuple[int, set[int], set[int]]]:
-        """Another group, and what the two shares would be: a vertex given, or swapped for one near to it."""
-        for vertex in sorted(shares[one]):
-            without = shares[one] - {vertex}
+    def _promising(self, one: int, orders: list[IntArray], lengths: FloatArray) -> list[tuple[int, int, int]]:
+        """The ``TRIED`` changes after which tours would be shortest if the rest of them stayed as it is."""
+        changes = self._changes(one, orders)
+        new = np.tile(lengths, (len(changes), 1))
+        for row, (other, gone, come) in zip(new, changes, strict=True):
+            row[one] = exchanged_cost(self._costs_m, orders[one], gone, come)
+            row[other] = exchanged_cost(self._costs_m, orders[other], come, gone)
+        return [changes[k] for k in np.argsort(self._cost(new), kind="stable")[:TRIED]]
+
+    def _changes(self, one: int, orders: list[IntArray]) -> list[tuple[int, int, int]]:
+        """Another group, the vertex that goes there, and the one near to it that comes back; -1: none."""
+        owner = {int(vertex): group for group, order in enumerate(orders) for vertex in order}
+        found = []
+        for vertex in sorted(orders[one].tolist()):
             given = set()
             for near in self._near[vertex].tolist():
                 other = owner[near]
                 if other == one:
                     continue
-                if without and other not in given:
+                if len(orders[one]) > 1 and other not in given:
                     given.add(other)
-                    yield other, without, shares[other] | {vertex}
-                yield other, without | {near}, (shares[other] - {near}) | {vertex}
+                    found.append((other, vertex, -1))
+                found.append((other, vertex, near))
+        return found
 
-    def _cost(self, lengths: FloatArray) -> float:
+    def _changed(self, order: IntArray, gone: int, come: int) -> IntArray:
+        """A good tour without one vertex and with another; -1: as it is."""
+        changed = exchanged(self._costs_m, order, gone, come)
+        return np.asarray(improve(self._costs_m, changed, MOST_MOVES)) if len(changed) > 3 else changed
+
+    def _length(self, order: IntArray) -> float:
+        return float(tour_cost(self._costs_m, order))
+
+    def _cost(self, lengths: FloatArray) -> FloatArray:
+        """Of lengths (..., G): the longest of a robot's walks, but shorter ones count a little."""
         each = lengths / self._sizes
-        longest = max(float(each.max()), 1e-9)
-        return longest * math.pow(float(((each / longest) ** SOFT_MAX).sum()), 1.0 / SOFT_MAX)
-
-    def _length(self, share: set[int]) -> float:
-        key = frozenset(share)
-        if key not in self._lengths:
-            order = _order(self._graph.shortest_m, key)
-            self._lengths[key] = float(tour_cost(self._graph.shortest_m, order))
-        return self._lengths[key]
+        longest = np.maximum(each.max(axis=-1), 1e-9)
+        return np.asarray(
+            longest * ((each / longest[..., None]) ** SOFT_MAX).sum(axis=-1) ** (1.0 / SOFT_MAX)
+        )
 
 
 def _order(shortest_m: FloatArray, share: frozenset[int]) -> IntArray:
