@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import TypeAlias
 
 import numpy as np
 
@@ -33,8 +34,12 @@ NEIGHBOURS = 8
 """A vertex changes to shares of so many nearest ones."""
 CHANGES, HEATS, COLD = 20_000, (0.05, 0.1, 0.2, 0.4), 0.0005
 """Changes of a try at random, and the heats that tries begin and end with, in walks of a robot."""
+DRAWS = 6
 TURNING = 2
 """Tries in which turns count, from as many of the heats."""
+
+Orders: TypeAlias = tuple[IntArray, IntArray]
+"""(G, V) the vertices that each group's walk goes through in turn, and how many of them count (G,)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -99,30 +104,52 @@ def annealed(
     count = len(graph)
     if len(sizes) == 1 or len(sizes) == count:
         return partition(graph, sizes)
-    orders, counts = np.zeros((len(sizes), count), dtype=np.int64), np.zeros(len(sizes), dtype=np.int64)
+    orders, counts = _without_turns(graph, sizes, mean_weight, sharing_cost)
+    if turn_m > 0.0:
+        # Turns make walks hard to change: they count from where walks are short without them.
+        heats = HEATS[:TURNING]
+        orders, counts = _tried(graph, sizes, (orders, counts), heats, (mean_weight, sharing_cost, turn_m))
+    walks = [Round.through(graph, order[:number]) for order, number in zip(orders, counts, strict=True)]
+    return _plan(graph, walks, sizes)
+
+
+@lru_cache(maxsize=256)
+def _without_turns(
+    graph: PatrolGraph, sizes: tuple[int, ...], mean_weight: float, sharing_cost: float
+) -> Orders:
+    """Orders of the groups' walks from the levelled shares, turning back free."""
+    orders, counts = np.zeros((len(sizes), len(graph)), dtype=np.int64), np.zeros(len(sizes), dtype=np.int64)
     for group, share in enumerate(_shares(graph, sizes)):
         order = _order(graph.shortest_m, share)
         orders[group, : len(order)], counts[group] = order, len(order)
+    return _tried(graph, sizes, (orders, counts), HEATS, (mean_weight, sharing_cost, 0.0))
+
+
+def _tried(
+    graph: PatrolGraph,
+    sizes: tuple[int, ...],
+    begin: Orders,
+    heats: Sequence[float],
+    costs: tuple[float, float, float],
+) -> Orders:
+    """The best of changes at random, once from each heat; what the mean, sharing and turning back cost."""
+    mean_weight, sharing_cost, turn_m = costs
     near = np.ascontiguousarray(_near(graph))
     each_m = Round.best(graph).length_m / sum(sizes)
     hops, edges_m = np.ascontiguousarray(graph.next_hop), np.ascontiguousarray(graph.edges_m)
-    places_xy_m, many = np.ascontiguousarray(graph.vertices_xy_m), np.array(sizes)
-    # Every robot must come to the same plan: no stream of its own.
-    rng = np.random.default_rng(0)
-    # Turns make walks hard to change: they count from where walks are short without them.
-    for costs_m in (0.0, turn_m) if turn_m > 0.0 else (0.0,):
-        ground = hops, edges_m, places_xy_m, costs_m
-        best: tuple[float, IntArray, IntArray] | None = None
-        for heat in HEATS if costs_m == 0.0 else HEATS[:TURNING]:
-            tried, number = orders.copy(), counts.copy()
-            draws, heats = rng.random((CHANGES, 6)), (heat * each_m, COLD * each_m)
-            cost = anneal(tried, number, many, near, draws, heats, mean_weight, sharing_cost, ground)
-            if best is None or cost < best[0]:
-                best = float(cost), tried, number
-        assert best is not None  # there are heats
-        _, orders, counts = best
-    walks = [Round.through(graph, order[:number]) for order, number in zip(orders, counts, strict=True)]
-    return _plan(graph, walks, sizes)
+    ground, many = (hops, edges_m, np.ascontiguousarray(graph.vertices_xy_m), turn_m), np.array(sizes)
+    # Every robot must come to the same plan: no stream of its own. With turns it goes on where it was.
+    used = 0 if turn_m == 0.0 else len(HEATS) * CHANGES * DRAWS
+    rng = np.random.Generator(np.random.PCG64(0).advance(used))
+    best: tuple[float, IntArray, IntArray] | None = None
+    for heat in heats:
+        orders, counts = begin[0].copy(), begin[1].copy()
+        draws, warm_cold = rng.random((CHANGES, DRAWS)), (heat * each_m, COLD * each_m)
+        cost = anneal(orders, counts, many, near, draws, warm_cold, mean_weight, sharing_cost, ground)
+        if best is None or cost < best[0]:
+            best = float(cost), orders, counts
+    assert best is not None  # there are heats
+    return best[1], best[2]
 
 
 @lru_cache(maxsize=256)
