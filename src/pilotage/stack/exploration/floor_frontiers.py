@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from pilotage.core.types import BoolArray, FloatArray, IntArray
 from pilotage.kernels.grids.distance import squared_distance
 from pilotage.kernels.grids.travel_cost import travel_costs
+from pilotage.kernels.grids.view import first_in_view
 from pilotage.maps.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyArray
 from pilotage.stack.exploration.narrow_places import with_narrow_places
 
@@ -183,18 +184,10 @@ class SeenFloor:
         c0, c1 = max(0, middle[1] - reach), min(columns, middle[1] + reach + 1)
         cost = self.cost_m.reshape(rows, columns)[r0:r1, c0:c1]
         row, column = np.nonzero(np.isfinite(cost))
-        for k in np.argsort(cost[row, column], kind="stable")[:VIEWS].tolist():
-            cell = r0 + int(row[k]), c0 + int(column[k])
-            if self._sees(cell, middle):
-                return int(cell[0] * columns + cell[1])
-        return -1
-
-    def _sees(self, a: tuple[int, int], b: tuple[int, int]) -> bool:
-        """Whether nothing solid is on the line between two cells."""
-        count = 2 * max(abs(a[0] - b[0]), abs(a[1] - b[1])) + 1
-        rows = np.rint(np.linspace(a[0], b[0], count)).astype(np.int64)
-        columns = np.rint(np.linspace(a[1], b[1], count)).astype(np.int64)
-        return not self._solid[rows, columns].any()
+        cheapest = np.argsort(cost[row, column], kind="stable")[:VIEWS]
+        row, column = r0 + row[cheapest], c0 + column[cheapest]
+        k = first_in_view(self._solid, row, column, *middle)
+        return int(row[k] * columns + column[k]) if k >= 0 else -1
 
     def _nearest_with_room(self, xy_m: FloatArray) -> int:
         """Number of the cell of a point, or of the nearest one with room where it has none."""

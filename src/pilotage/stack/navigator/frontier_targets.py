@@ -40,7 +40,7 @@ class Targets:
 
     def __init__(self, config: FloorExplorerConfig, reach_m: float) -> None:
         self._config, self._sight_m = config, config.sight_share * reach_m
-        self._looked: list[FloatArray] = []
+        self._looked: list[list[float]] = []
         self._tried: list[tuple[FloatArray, float]] = []
         """Places on frontiers that it stood on or could not get to, and how much around them is given up."""
         self._unsure: list[FloatArray] = []
@@ -67,11 +67,11 @@ class Targets:
         if target.crossing:
             self._tried.append((target.xy_m, CROSSED_M))
         else:
-            self._looked.append(target.frontier_xy_m)
+            self._looked.append(target.frontier_xy_m.tolist())
 
     def failed(self, target: Target, around_m: float = FAILED_M) -> None:
         """It cannot get to a target: the frontier counts as looked at, its cells around as tried."""
-        self._looked.append(target.frontier_xy_m)
+        self._looked.append(target.frontier_xy_m.tolist())
         if target.crossing:
             self._tried.append((target.xy_m, around_m))
 
@@ -92,4 +92,5 @@ class Targets:
         return (int(frontier.crossings[open_.argmax()]), True) if open_.any() else (-1, False)
 
     def _is_looked(self, frontier: Frontier) -> bool:
-        return any(float(np.hypot(*(frontier.middle_xy_m - place))) < SAME_M for place in self._looked)
+        middle = frontier.middle_xy_m.tolist()
+        return any(math.dist(middle, place) < SAME_M for place in self._looked)
