@@ -70,6 +70,9 @@ def test_a_file_in_pixels_becomes_metres(tmp_path: Path) -> None:
         (PAIR.replace("10 20 1 1 E 30", "10 20 0").replace("1 0 W 34", "0"), "connected"),
         (PAIR.replace("E 30", "E x"), "found 'x'"),
         ("99999" + PAIR[1:], "at most 2,000"),
+        (PAIR.replace("E 30", "E -30"), "line 3: expected the cost from vertex 0 to 1 not below 0"),
+        (PAIR.replace("40 20", "4_0 20"), "line 5: expected a pixel of vertex 1, found '4_0'"),
+        (PAIR.replace("\n", "\r\n").replace("\n1 40", "\nx 40"), "line 5: expected vertex 1, found 'x'"),
     ],
 )
 def test_what_is_no_graph_is_refused_in_one_line(tmp_path: Path, text: str, said: str) -> None:
@@ -77,6 +80,12 @@ def test_what_is_no_graph_is_refused_in_one_line(tmp_path: Path, text: str, said
         graph_in(tmp_path, text)
     assert "\n" not in str(caught.value)
     assert "floor.graph" in str(caught.value)
+
+
+def test_neighbours_that_are_told_twice_are_one(tmp_path: Path) -> None:
+    """One of the published files has such a vertex."""
+    twice = graph_in(tmp_path, PAIR.replace("1 1 E 30", "2 1 W 99 1 E 30"))
+    assert twice == graph_in(tmp_path, PAIR)
 
 
 @settings(max_examples=200, deadline=None)

@@ -45,6 +45,22 @@ def test_where_no_passage_has_more_room_all_of_the_floor_will_do() -> None:
     assert floor.draw(np.random.default_rng(0), part=floor.easy) is not None
 
 
+@pytest.mark.parametrize(
+    ("about", "low_x_m", "high_x_m"),
+    [((9.0, 2.0), 8.0, 11.0), ((8.2, 4.5), 8.0, 11.0), ((2.0, 0.0), 0.0, 8.0), ((50.0, 2.0), 0.0, 8.0)],
+)
+def test_a_place_beside_a_wall_tells_which_floor_a_task_is_about(
+    about: tuple[float, float], low_x_m: float, high_x_m: float
+) -> None:
+    """A patrol's first vertex too near to a wall was refused as the mission's start, which it has not got.
+
+    One that is nowhere near floor leaves the largest, for the task to say so.
+    """
+    floor, rng = OpenFloor(WORLD, 0.5, None, about), np.random.default_rng(0)
+    drawn = [floor.draw(rng) for _ in range(40)]
+    assert all(place is not None and low_x_m < place.x_m < high_x_m for place in drawn)
+
+
 def test_places_are_drawn_as_if_one_by_one_however_many_are_thrown_away() -> None:
     floor, rng, other = OpenFloor(WORLD, 2.3, None), np.random.default_rng(5), np.random.default_rng(5)
     place = floor.draw(rng)

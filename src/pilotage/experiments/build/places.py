@@ -17,7 +17,7 @@ from pilotage.core.types import BoolArray, FloatArray, Pose2
 from pilotage.experiments.build.robots import footprint_of
 from pilotage.kernels.grids.blocked_distance import distance_to_blocked
 from pilotage.maps.distance_field import DistanceField
-from pilotage.maps.floor import Floor
+from pilotage.maps.floor import SNAP_M, Floor
 from pilotage.maps.known_maps import OncePerMap
 from pilotage.maps.occupancy_grid import UNKNOWN
 from pilotage.maps.world_map import WorldMap
@@ -116,8 +116,6 @@ def _with_drawn_starts(mission: Mission, chart: WorldMap, about: tuple[float, fl
     """
     rng = RandomStreams(mission.run.seed).stream("starts")
     near = mission.world.start
-    if near is None and about is not None:
-        near = PoseConfig(x_m=about[0], y_m=about[1])
     radii_m = [footprint_of(robot, f"robots.{k}").radius_m for k, robot in enumerate(mission.robots)]
     placed: list[tuple[PoseConfig, float]] = [
         (robot.start, radius_m)
@@ -134,7 +132,7 @@ def _with_drawn_starts(mission: Mission, chart: WorldMap, about: tuple[float, fl
             # Bodies stand apart however little is asked for.
             apart = [(place, max(mission.team.spacing_m, clear_m + radius_m)) for place, radius_m in placed]
             if clear_m not in floors:
-                floors[clear_m] = OpenFloor(chart, clear_m, near)
+                floors[clear_m] = OpenFloor(chart, clear_m, near, about)
             floor = floors[clear_m]
             if clear_m not in full:
                 start = floor.draw(rng, apart, floor.easy)
@@ -244,19 +242,32 @@ def random_pose(
 class OpenFloor:
     """The floor that is connected to a place at a clearance; without a place the largest one.
 
+    Parameters
+    ----------
+    about
+        Without a place: the floor nearest to this one, which may be beside a wall or in one. Whether anybody
+        can get there its task tells, in its own words.
+
     Raises
     ------
     InputError
         Where the place itself has less clearance.
     """
 
-    def __init__(self, chart: WorldMap, clearance_m: float, reachable_from: PoseConfig | None) -> None:
+    def __init__(
+        self,
+        chart: WorldMap,
+        clearance_m: float,
+        reachable_from: PoseConfig | None,
+        about: tuple[float, float] | None = None,
+    ) -> None:
         self._chart, self._clearance_m = chart, clearance_m
         self._field = chart.field if chart.geometry is None else _finer_field(chart)
         self._regions, count = scipy.ndimage.label(self._field.distance_m >= clearance_m)
         if reachable_from is None:
             sizes = np.bincount(self._regions.ravel(), minlength=2)
-            self._home = int(np.argmax(sizes[1:])) + 1 if count else 0
+            largest = int(np.argmax(sizes[1:])) + 1 if count else 0
+            self._home = largest if about is None else self._nearest_region(*about) or largest
             return
         self._home = self._region(reachable_from.x_m, reachable_from.y_m)
         if self._home == 0:
@@ -300,6 +311,25 @@ class OpenFloor:
 
     def _region(self, x: float, y: float) -> int:
         return int(self._at_nodes(self._regions, np.array([[x, y]]))[0])
+
+    def _nearest_region(self, x: float, y: float) -> int:
+        """That of the nearest node that has room, no farther than a task takes a place to be; else 0."""
+        low_m = np.asarray(self._field.origin_xy_m)
+        columns, rows = (
+            np.flatnonzero(np.abs(origin_m + self._field.resolution_m * np.arange(count) - at) <= SNAP_M)
+            for origin_m, count, at in zip(low_m, self._regions.shape[::-1], (x, y), strict=True)
+        )
+        near = self._regions[np.ix_(rows, columns)]
+        away_m = np.hypot(
+            *np.meshgrid(
+                low_m[0] + self._field.resolution_m * columns - x,
+                low_m[1] + self._field.resolution_m * rows - y,
+            )
+        )
+        away_m = np.where((near > 0) & (away_m <= SNAP_M), away_m, np.inf)
+        if not np.isfinite(away_m).any():
+            return 0
+        return int(near.ravel()[np.argmin(away_m)])
 
     def _at_nodes(self, nodes: np.ndarray[Any, Any], points_m: FloatArray) -> np.ndarray[Any, Any]:
         """(N,) what the node nearest to each place has; zero beyond the map."""

@@ -17,6 +17,8 @@ from pilotage.stack.patrol.graph import PatrolGraph
 
 MOST_VERTICES = 2000
 """All pairs of them have a shortest path."""
+LARGEST = 1e9
+"""No number of a floor is as large."""
 IN_WALL = 0.5 * math.sqrt(2.0)
 """So many cells from a cell's middle a wall may still pass through it."""
 
@@ -29,41 +31,43 @@ def read_patrol_graph(path: Path) -> PatrolGraph:
     up, below 0 where they are counted from the middle), how many neighbours, and of each its number, a
     compass direction and the cost of the edge in pixels. Costs that differ both ways are averaged (they are
     rounded by hand); none is taken for less than the straight line. What is told one way only can be driven
-    back as well.
+    back as well; what is told twice, as in files that are published, counts as told last.
 
     Raises
     ------
     InputError
-        Where the file is missing, cut short or holds something else; where the graph is not connected.
+        Where the file is missing, cut short or holds something else, with the line; where the graph is not
+        connected.
     """
-    words = iter(enumerate(read_text(path, "a patrol graph").split(), start=1))
-    count = _whole(words, path, "a number of vertices", 1)
+    words = _Words(path)
+    count = words.whole("a number of vertices", 1)
     if count > limit(MOST_VERTICES):
         raise too_large(str(path), limit(MOST_VERTICES), count, "vertices")
     for _ in range(2):
-        _whole(words, path, "a size in pixels", 1)
-    resolution_m = _number(words, path, "metres a pixel")
+        words.whole("a size in pixels", 1)
+    resolution_m = words.number("metres a pixel")
     if not resolution_m > 0.0:
-        raise InputError(f"{path}: expected metres a pixel above 0, found {resolution_m:g}")
-    corner = [_number(words, path, "an offset in metres") for _ in range(2)]
+        raise words.misfit(f"expected metres a pixel above 0, found {resolution_m:g}")
+    corner = [words.number("an offset in metres") for _ in range(2)]
     places, costs = np.zeros((count, 2)), np.full((count, count), np.inf)
     for vertex in range(count):
-        number = _whole(words, path, f"vertex {vertex}", 0)
+        number = words.whole(f"vertex {vertex}", 0)
         if number != vertex:
-            raise InputError(f"{path}: expected vertex {vertex}, found {number}; they are numbered from 0")
+            raise words.misfit(f"expected vertex {vertex}, found {number}; they are numbered from 0")
         for axis in range(2):
-            places[vertex, axis] = _number(words, path, f"a pixel of vertex {vertex}")
-        for _ in range(_whole(words, path, f"a number of neighbours of vertex {vertex}", 0)):
-            other = _whole(words, path, f"a neighbour of vertex {vertex}", 0)
+            places[vertex, axis] = words.number(f"a pixel of vertex {vertex}")
+        for _ in range(words.whole(f"a number of neighbours of vertex {vertex}", 0)):
+            other = words.whole(f"a neighbour of vertex {vertex}", 0)
             if other >= count or other == vertex:
-                raise InputError(
-                    f"{path}: vertex {vertex}: expected neighbours among the other {count - 1}, found {other}"
+                raise words.misfit(
+                    f"vertex {vertex}: expected neighbours among the other {count - 1}, found {other}"
                 )
-            _word(words, path, "a direction")
-            costs[vertex, other] = _number(words, path, f"the cost from vertex {vertex} to {other}")
-    left = next(words, None)
-    if left is not None:
-        raise InputError(f"{path}: expected {count} vertices and no more, found '{left[1][:20]}' after them")
+            words.next("a direction")
+            cost = words.number(what := f"the cost from vertex {vertex} to {other}")
+            if cost < 0.0:
+                raise words.misfit(f"expected {what} not below 0, found {cost:g}")
+            costs[vertex, other] = cost
+    words.end(count)
     back = np.where(np.isfinite(costs.T), costs.T, costs)
     costs = np.where(np.isfinite(costs), costs, back)
     xy = np.array(corner) + resolution_m * places
@@ -90,30 +94,51 @@ def on_floor(graph: PatrolGraph, floor: Floor, where: str = "patrol graph") -> P
     return PatrolGraph.of(xy, lengths_m, where)
 
 
-_Words = Iterator[tuple[int, str]]
+class _Words:
+    """The words of a file one after the other, and the line of the last one."""
 
+    def __init__(self, path: Path) -> None:
+        lines = read_text(path, "a patrol graph").split("\n")
+        self._path, self._line = path, 0
+        self._words: Iterator[tuple[int, str]] = (
+            (number, word) for number, line in enumerate(lines, start=1) for word in line.split()
+        )
 
-def _word(words: _Words, path: Path, what: str) -> tuple[int, str]:
-    found = next(words, None)
-    if found is None:
-        raise InputError(f"{path}: expected {what}, found the end; the file seems to be cut short")
-    return found
+    def misfit(self, text: str) -> InputError:
+        """What is wrong with the last word."""
+        return InputError(f"{self._path} line {self._line}: {text}")
 
+    def next(self, what: str) -> str:
+        """Any word."""
+        found = next(self._words, None)
+        if found is None:
+            raise InputError(f"{self._path}: expected {what}, found the end; the file seems to be cut short")
+        self._line, word = found
+        return word
 
-def _number(words: _Words, path: Path, what: str) -> float:
-    place, word = _word(words, path, what)
-    try:
-        value = float(word)
-    except ValueError:
-        value = math.nan
-    if not abs(value) < 1e9:
-        raise InputError(f"{path}: word {place}: expected {what}, found '{word[:20]}'")
-    return value
+    def number(self, what: str) -> float:
+        """A finite number."""
+        word = self.next(what)
+        try:
+            # Python reads 1_000 as a number; a file that holds such a word is damaged.
+            value = float(word.replace("_", "?"))
+        except ValueError:
+            value = math.nan
+        if not abs(value) < LARGEST:
+            raise self.misfit(f"expected {what}, found '{word[:20]}'")
+        return value
 
+    def whole(self, what: str, least: int) -> int:
+        """A whole number."""
+        word = self.next(what)
+        number = whole_number(word)
+        if number is None or number < least:
+            raise self.misfit(f"expected {what}, found '{word[:20]}'")
+        return number
 
-def _whole(words: _Words, path: Path, what: str, least: int) -> int:
-    place, word = _word(words, path, what)
-    number = whole_number(word)
-    if number is None or number < least:
-        raise InputError(f"{path}: word {place}: expected {what}, found '{word[:20]}'")
-    return number
+    def end(self, count: int) -> None:
+        """No more words behind so many vertices."""
+        left = next(self._words, None)
+        if left is not None:
+            self._line, word = left
+            raise self.misfit(f"expected {count} vertices and no more, found '{word[:20]}' after them")
