@@ -113,6 +113,18 @@ def test_a_robot_that_backs_into_somebody_who_comes_is_to_blame() -> None:
     assert met(sim).collisions == sim.bodies[0].collisions == 1
 
 
+def test_who_walks_through_a_robot_comes_as_near_as_nothing_and_no_nearer() -> None:
+    """They were told as 0.25 m inside each other with nothing having collided."""
+    sim = among([Walker(lambda t: (-2.0 + 1.0 * t, 0.0))])
+    cleared_m = []
+    for _ in range(40):
+        sim.step([STAY])
+        cleared_m.append(sim.bodies[0].clearance_m)
+    assert (met(sim).touches, met(sim).collisions, sim.bodies[0].collisions) == (1, 0, 0)
+    assert min(cleared_m) == met(sim).closest_m == 0.0
+    assert cleared_m[-1] > 1.0
+
+
 def test_those_who_are_not_there_are_neither_seen_nor_met() -> None:
     sim = among([Walker(lambda t: (1.0, 0.0) if t > 0.45 else (math.nan, math.nan))])
     for _ in range(4):

@@ -161,11 +161,13 @@ def meet_others(
     for r in range(states.shape[0]):
         state = states[r]
         outline = (corners[first[r] : first[r + 1]], radii[r], 0.0)
-        gap = others_clearance(state[X], state[Y], state[THETA], outline, others, own[r])
-        state[CLEARANCE] = min(state[FIXED_CLEARANCE], gap)
+        gap = nearest = others_clearance(state[X], state[Y], state[THETA], outline, others, own[r])
         if first_person < others[1].shape[0] and gap < CONTACT_M:
             robots = (others[0], others[1][:first_person])
             gap = others_clearance(state[X], state[Y], state[THETA], outline, robots, own[r])
+            # Who walked into it goes through it, and is no nearer than at it.
+            nearest = min(gap, max(nearest, 0.0))
+        state[CLEARANCE] = min(state[FIXED_CLEARANCE], nearest)
         if gap < CONTACT_M and state[TOUCHING] == 0.0:
             state[COLLISIONS] += 1.0
             state[TOUCHING] = 2.0

@@ -140,7 +140,8 @@ def meet_people(
                 clear = outline_clearance(
                     px, py, math.cos(theta), math.sin(theta), shape, radii[r], no_sides, disc
                 )
-                tally[r, CLOSEST] = min(tally[r, CLOSEST], clear)
+                # Who walked into it goes through it, and is no nearer than at it.
+                tally[r, CLOSEST] = min(tally[r, CLOSEST], max(clear, 0.0))
                 if clear < CONTACT_M:
                     touched = True
                     # The person held where it is: what the robot alone did to the gap just before.
