@@ -78,7 +78,7 @@ class TestRadio:
 
 class TestTeam:
     def test_robots_of_one_description_begin_apart_and_draw_apart(self) -> None:
-        mission = load_mission("museum-1", [*MUSEUM, "team.size=6", "team.radio.range_m=10"])
+        mission = load_mission("museum-1", [*MUSEUM, "team.size=6.0", "team.radio.range_m=10"])
         assert [robot.name for robot in mission.members] == [f"robot-{k}" for k in range(6)]
         assert mission.members[0].sensors["radio"].parameters == {"range_m": 10}
         source = build_source(mission)
@@ -104,6 +104,7 @@ class TestTeam:
             ),
             (["team.size=0"], r"team\.size"),
             (["team.size=3", "robots=[{}]"], r"team\.size: expected 1, as many as robots lists"),
+            (["team.size=2", "team.radio.range_m=0"], r"found 0; to have no radio set team\.radio to null"),
             (["team.size=2", "team.radio=telegraph"], "unknown sensor 'telegraph'"),
             (["team.size=2", "team.radio=5"], r"^team\.radio: expected a mapping with keys of name, found 5"),
             (["team.size=2", "team.radio={name: 5}"], r"^team\.radio\.name: input should be a valid string"),

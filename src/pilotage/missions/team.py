@@ -84,9 +84,13 @@ def with_team(values: dict[str, Any]) -> dict[str, Any]:
     size, robots, starts = team.get("size"), values.get("robots"), team.get("starts") or ()
     if not isinstance(starts, list | tuple) or not all(isinstance(start, Mapping) for start in starts):
         return values
-    if isinstance(size, int) and not isinstance(size, bool) and 1 <= size <= LARGEST_TEAM and not robots:
-        placed = [{"start": start} for start in starts[:size]]
-        robots = placed + [{} for _ in range(size - len(placed))]
+    # What the field takes for a whole number: 4.0 as well.
+    whole = (
+        isinstance(size, int | float) and not isinstance(size, bool) and size in range(1, LARGEST_TEAM + 1)
+    )
+    if whole and not robots:
+        placed = [{"start": start} for start in starts[: int(size)]]
+        robots = placed + [{} for _ in range(int(size) - len(placed))]
         values = {**values, "robots": robots}
     radio = team.get("radio")
     named = radio.get("name", RADIO) if isinstance(radio, Mapping) else radio

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from pydantic import Field
+from typing import Any
+
+from pydantic import Field, field_validator
 
 from pilotage.sensors.sensor import SENSORS, NonNegative, Positive, SensorConfig
 
@@ -20,3 +22,11 @@ class RadioConfig(SensorConfig):
     """Share of messages that do not arrive, each at each receiver for itself."""
     delay_s: NonNegative = 0.0
     """At the receiver, beside the step that any message takes."""
+
+    @field_validator("range_m", mode="before")
+    @classmethod
+    def _carries_somewhere(cls, value: Any) -> Any:
+        """Who wants none asks for a range of 0, and is told how."""
+        if isinstance(value, int | float) and value == 0:
+            raise ValueError("expected a range above 0, found 0; to have no radio set team.radio to null")
+        return value
