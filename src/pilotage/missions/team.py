@@ -84,13 +84,10 @@ def with_team(values: dict[str, Any]) -> dict[str, Any]:
     size, robots, starts = team.get("size"), values.get("robots"), team.get("starts") or ()
     if not isinstance(starts, list | tuple) or not all(isinstance(start, Mapping) for start in starts):
         return values
-    # What the field takes for a whole number: 4.0 as well.
-    whole = (
-        isinstance(size, int | float) and not isinstance(size, bool) and size in range(1, LARGEST_TEAM + 1)
-    )
-    if whole and not robots:
-        placed = [{"start": start} for start in starts[: int(size)]]
-        robots = placed + [{} for _ in range(int(size) - len(placed))]
+    count = int(size) if isinstance(size, float) and size.is_integer() else size  # as the field reads it
+    if isinstance(count, int) and not isinstance(count, bool) and 1 <= count <= LARGEST_TEAM and not robots:
+        placed = [{"start": start} for start in starts[:count]]
+        robots = placed + [{} for _ in range(count - len(placed))]
         values = {**values, "robots": robots}
     radio = team.get("radio")
     named = radio.get("name", RADIO) if isinstance(radio, Mapping) else radio
