@@ -364,11 +364,18 @@ class TestTask:
         assert rehearsed == ["reach"]
 
     def test_who_leaves_some_of_it_has_not_swept_the_floor(self) -> None:
-        values = {**MISSIONS["sweep-floor"], "task": {"name": "sweep-floor", "width_m": 0.4}}
+        values = copy.deepcopy(MISSIONS["sweep-floor"])
+        values["stack"]["planner"] = {"name": "astar"}
         experiment = build(mission_of(values, seed=0))
         metrics = experiment.task.judge(run_loop(experiment).finished).metrics
         assert not metrics["success"]
         assert str(metrics["reason"]).startswith("swept ")
+
+    def test_passes_wider_than_what_they_sweep_are_refused(self) -> None:
+        """``task.width_m`` alone was driven to the end, with floor unswept between any two passes."""
+        values = {**MISSIONS["sweep-floor"], "task": {"name": "sweep-floor", "width_m": 0.4}}
+        with pytest.raises(InputError, match=r"stack\.planner\.width_m: expected at most 0\.4 m.*set both"):
+            build(mission_of(values, seed=0))
 
     def test_a_team_is_refused(self) -> None:
         values = {**MISSIONS["sweep-floor"], "team": {"size": 2}}

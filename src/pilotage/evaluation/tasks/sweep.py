@@ -18,8 +18,10 @@ from pilotage.evaluation.tasks.task import TASKS, Attempt, TaskSetting
 from pilotage.evaluation.tasks.watched import WatchedTask
 from pilotage.kernels.patrol.swept import mark_swept
 from pilotage.maps.floor import Floor, check_pass_width, pass_cell_m, sweepable
+from pilotage.missions.choice import ComponentChoice
 from pilotage.missions.places import GoalConfig
 from pilotage.sensors.sensor import NonNegative, Positive
+from pilotage.stack.planning.planner import PLANNERS
 
 BACK_M = 0.5
 
@@ -59,6 +61,7 @@ class SweepTask(WatchedTask):
         super().__init__((back,) if mission.goal_of(robot) is None else ())
         self._config, self._width_m = config, config.width_m or 2.0 * radius_m
         check_pass_width(setting.chart.bounds_m, self._width_m, "task 'sweep-floor'")
+        _check_planned(mission.stack_of(robot).planner, self._width_m)
         cell_m = pass_cell_m(self._width_m, radius_m)
         place = start.x_m, start.y_m
         floor = Floor.of(setting.chart, radius_m, cell_m, place, exact=True)
@@ -103,3 +106,15 @@ class SweepTask(WatchedTask):
                 f"swept {100.0 * swept:.2f} % of the floor, not {100.0 * self._config.least:g} %"
             )
         return Verdict(metrics, ({"nees": nees},), {})
+
+
+def _check_planned(choice: ComponentChoice | None, width_m: float) -> None:
+    """Refuse a planner that lays passes, ``width_m`` of its parameters apart, with unswept floor between."""
+    if choice is None:
+        return
+    planned_m = getattr(PLANNERS.configure(choice.name, choice.parameters, "stack.planner"), "width_m", None)
+    if planned_m is not None and planned_m > width_m:
+        raise InputError(
+            f"stack.planner.width_m: expected at most {width_m:g} m, what a pass sweeps (task.width_m, or "
+            f"the body's width), found {planned_m:g}; set both"
+        )
