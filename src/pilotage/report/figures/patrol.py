@@ -114,7 +114,10 @@ def _idleness_map(run: RunData, patrol: PatrolRecord) -> Illustration:
             str(k), (x, y), (5.0, 5.0), textcoords="offset points", fontsize=6.5, color=INK, zorder=7
         )
     keys = (Key("best closed tour", BLUE, "band", "tour"), Key("edges", MUTED, "line", "edges"))
-    caption = f"Mean time since each place's last visit ({scale}), and the tour of the cyclic reference."
+    caption = (
+        f"Mean time since each place's last visit ({scale}), and the tour of the cyclic reference; lines "
+        "tell what is joined, the paths lead around walls."
+    )
     alt = f"Map of {len(places)} places with their mean idleness"
     return Illustration(slug, title, alt, caption, render(axes.figure, slug, alt), keys)  # type: ignore[arg-type]
 

@@ -95,7 +95,8 @@ def _draw_robot(axes: Axes, run: RunData, placer: LabelPlacer, points_per_m: flo
     path = layers.true_path(run)
     layers.line(axes, path, layer, color=colour, linewidth=2.0, zorder=7)
     dashes = {"linestyle": (0, (3.0, 4.0)), "linewidth": 0.6}
-    layers.line(axes, layers.estimated_path(run), "estimated", color=INK, **dashes, zorder=8)
+    # Under the true ones: after many rounds the dashes of all robots hid whose path was whose.
+    layers.line(axes, layers.estimated_path(run), "estimated", color=INK, **dashes, zorder=6.5)
     for x, y, theta in outline.goals:
         axes.plot([x], [y], marker="X", color=colour, markersize=8.0, markeredgecolor="white", zorder=9.5)
         if theta is not None and len(polygon):

@@ -345,7 +345,7 @@ class ReplayMap {
     pen.font = "11px system-ui, sans-serif";
     pen.textAlign = "left";
     pen.textBaseline = "middle";
-    const taken = [];  // labels that would lie on another are left out; zooming in brings them back
+    const taken = [];  // labels without a corner that is free are left out; zooming in brings them back
     for (const layer of this.scene.marks) {
       if (!this.shows(layer)) continue;
       pen.fillStyle = pen.strokeStyle = this.colour(layer.colour);
@@ -366,10 +366,15 @@ class ReplayMap {
         else if (layer.look === "cross") { pen.moveTo(x - 5, y - 5); pen.lineTo(x + 5, y + 5); pen.moveTo(x + 5, y - 5); pen.lineTo(x - 5, y + 5); }
         else { pen.moveTo(x, y - 5); pen.lineTo(x + 5, y); pen.lineTo(x, y + 5); pen.lineTo(x - 5, y); pen.fill(); }
         if (layer.look === "ring" || layer.look === "cross") pen.stroke();
-        const box = [x + 8, y - 13, x + 10 + 7 * label.length, y - 1];
-        if (taken.some((o) => o[0] < box[2] && box[0] < o[2] && o[1] < box[3] && box[1] < o[3])) return;
-        taken.push(box);
-        pen.fillText(label, x + 8, y - 7);
+        const width = 2 + 7 * label.length;
+        const spots = [[x + 8, y - 7], [x + 8, y + 7], [x - 8 - width, y - 7], [x - 8 - width, y + 7]];
+        for (const [left, middle] of spots) {
+          const box = [left, middle - 6, left + width, middle + 6];
+          if (taken.some((o) => o[0] < box[2] && box[0] < o[2] && o[1] < box[3] && box[1] < o[3])) continue;
+          taken.push(box);
+          pen.fillText(label, left, middle);
+          break;
+        }
       });
     }
   }
