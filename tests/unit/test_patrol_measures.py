@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pilotage.core.errors import InputError
 from pilotage.experiments.build.build import build
 from pilotage.experiments.loop import run_loop
 from pilotage.experiments.mission import mission_of, read_mission
@@ -32,6 +33,23 @@ def test_who_failed_neither_visits_nor_sees_until_it_is_mended(*, mended: bool) 
     # Who is there at the end and failed long ago has not stayed.
     worst_s = task._visits.idleness(END_S, 0.0)[0].vertex_worst_s
     assert mended or worst_s.min() >= END_S - FAILS_S - 0.41
+
+
+@pytest.mark.parametrize("dead", [0, 1, 2])
+def test_a_patrol_goes_on_without_some_and_not_without_all(dead: int) -> None:
+    """All robots dead, from the first minute of an hour on, was told as a success of every one of them."""
+    values = read_mission("museum-patrol")
+    walls = [[0, 0, 6, 0], [6, 0, 6, 5], [6, 5, 0, 5], [0, 5, 0, 0]]
+    values["world"] = {"map": {"map": "a room", "bounds_m": [0, 0, 6, 5], "walls_m": walls}}
+    values["task"] = {"name": "patrol", "duration_s": END_S}
+    failures = [{"robot": robot, "at_s": FAILS_S} for robot in range(dead)]
+    values["team"] = {"size": 2, "strategy": "cyclic", "failures": failures}
+    experiment = build(mission_of(values, seed=0))
+    metrics: Any = experiment.task.judge(run_loop(experiment).finished).metrics
+    assert metrics["success"] == (dead < 2)
+    assert [own["success"] for own in metrics["robots"].values()] == [dead < 1, dead < 2]
+    assert ("dead" in metrics["reason"]) == (dead > 0)
+    assert metrics["robots_failed"] == dead
 
 
 def test_what_either_of_two_lasers_sees_is_seen() -> None:
@@ -67,3 +85,14 @@ def test_a_derived_graph_reckons_with_the_shortest_laser() -> None:
     assert away_m.max() <= 2.0  # also from half a metre beside each place
     assert len(vertices(9.0)[0]) == len(vertices(20.0)[0]) == 1
     assert len(vertices(2.0, reach_m=8.0)[0]) == 1  # what is said stands
+
+
+def test_a_visit_nearer_than_nodes_lie_says_so() -> None:
+    """It was told that a wall was there."""
+    values = read_mission("museum-patrol")
+    walls = [[0, 0, 6, 0], [6, 0, 6, 5], [6, 5, 0, 5], [0, 5, 0, 0]]
+    values["world"] = {"map": {"map": "a room", "bounds_m": [0, 0, 6, 5], "walls_m": walls}}
+    values["task"] = {"name": "patrol", "visit_m": 1e-9}
+    values["team"] = {"size": 1, "strategy": "cyclic"}
+    with pytest.raises(InputError, match=r"within 5e-10 m of vertex 0 .* or a larger task\.visit_m"):
+        build(mission_of(values, seed=0))

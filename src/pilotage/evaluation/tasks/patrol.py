@@ -64,7 +64,8 @@ class PatrolConfig(Config):
 
 @TASKS.add("patrol", PatrolConfig)
 class PatrolTask:
-    """Done when its time is over; a success if nobody touched anything and nobody was deadlocked.
+    """Done when its time is over; a success if nobody touched anything, nobody was deadlocked, and not
+    everybody stood dead in the end.
 
     All places count as visited, and the floor as seen, when it begins.
     """
@@ -105,6 +106,7 @@ class PatrolTask:
         self._floor = FloorAges(setting.chart, graph.vertices_xy_m[0], CELL_M)
         self._warm_s = min(config.warm_s, 0.25 * min(config.duration_s, mission.run.time_limit_s))
         self._failed: frozenset[str] = frozenset()
+        self._dead: frozenset[int] = frozenset()
         dt_s = mission.run.dt_s
         self._visits_every, self._see_every, self._look_every = (
             max(1, round(every_s / dt_s)) for every_s in (VISITS_EVERY_S, SEE_EVERY_S, LOOK_EVERY_S)
@@ -148,6 +150,7 @@ class PatrolTask:
         """How long ago the floor was seen, how idle the places are, and who does not get on."""
         for index, attempt in enumerate(attempts):
             self._watch(index, t_s, attempt)
+        self._dead = frozenset(k for k, attempt in enumerate(attempts) if attempt.body.stopped)
         self._failed = frozenset(
             attempt.body.name
             for attempt in attempts
@@ -190,6 +193,7 @@ class PatrolTask:
         strategy = run.mission.team.strategy
         graph = self.patrol.graph
         metrics = judged.metrics
+        metrics |= self._in_the_end(run)
         metrics |= {
             "team_size": len(run.robots),
             "strategy": "" if strategy is None else strategy.name,
@@ -213,6 +217,16 @@ class PatrolTask:
             metrics |= {"static_guards_bound": least, "static_guards_enough": enough}
         return Verdict(metrics, judged.columns, {**judged.extras, **self._arrays(run)})
 
+    def _in_the_end(self, run: FinishedRun) -> dict[str, object]:
+        """What the dead make of it: a team goes on without some of its robots, and not without all."""
+        count, dead = len(run.robots), len(self._dead)
+        harmed = any(robot.collisions for robot in run.robots) or bool(self._stuck.since_s)
+        if not dead or harmed or count == 1:
+            return {}
+        if dead == count:
+            return {"success": False, "reason": f"all {count} robots stood dead in the end"}
+        return {"success": True, "reason": f"{run.ending}; {dead} of {count} robots stood dead by then"}
+
     def _judged(self, run: FinishedRun, robot: RobotRun, index: int) -> Verdict:
         metrics = header(run, robot)
         driven, nees = driving_metrics(run, robot)
@@ -221,7 +235,10 @@ class PatrolTask:
             metrics["reason"] = f"touched something, {robot.collisions} times in all"
         elif index in self._stuck.since_s:
             metrics["reason"] = f"deadlocked from {self._stuck.since_s[index]:.0f} s on"
-        metrics["success"] = robot.collisions == 0 and index not in self._stuck.since_s
+        elif index in self._dead:
+            metrics["reason"] = "it stood dead in the end"
+        unharmed = robot.collisions == 0 and index not in self._stuck.since_s
+        metrics["success"] = unharmed and index not in self._dead
         return Verdict(metrics, ({"nees": nees},), {})
 
     def _arrays(self, run: FinishedRun) -> dict[str, FloatArray]:

@@ -147,9 +147,11 @@ class Roadmap:
         )
         best = int(np.argmin(away)) if away.size else -1
         if best < 0 or away[best] > near_m:
+            farther = ", or a larger task.visit_m" * (place < self._vertices)
             raise InputError(
-                f"patrol graph: expected {clearance_m:.2f} m of room around {self._called(place)} at "
-                f"({x:g}, {y:g}), found a wall; move it or take a smaller robot"
+                f"patrol graph: expected {clearance_m:.2f} m of room within {near_m:g} m of "
+                f"{self._called(place)} at ({x:g}, {y:g}), found none; move it or take a smaller "
+                f"robot{farther}"
             )
         return int(rows[best]), int(columns[best])
 
