@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pytest
 
+from pilotage.core.types import Pose2
 from pilotage.evaluation.narrow_passages import cut_off
 from pilotage.experiments.build.build import build
 from pilotage.experiments.mission import mission_of, read_mission
 from pilotage.maps.floor import Floor
+from pilotage.maps.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
+from pilotage.maps.world_map import WorldMap
 from support.patrol_floors import walled, with_door
 
 
@@ -28,6 +32,18 @@ def test_what_nobody_could_come_to_is_not_left_out() -> None:
     assert floor.apart_fraction == pytest.approx(0.5, abs=0.05)
     assert floor.cut_off_fraction == 0.0
     assert cut_off(floor) == []
+
+
+def test_what_is_solid_is_no_floor_that_nothing_leads_to() -> None:
+    """Of rooms amid unknown cells a sweep told up to 96 % of the floor as beyond reach, a patrol nothing."""
+    cells = np.full((100, 120), UNKNOWN, dtype=np.int8)
+    cells[20:80, 30:90] = FREE
+    cells[40:55, 50:70] = OCCUPIED
+    grid = OccupancyGrid(cells, 0.05, Pose2(0.0, 0.0, 0.0))
+    world = WorldMap("a room", (0.0, 0.0, 6.0, 5.0), grid=grid)
+    sampled, exact = (Floor.of(world, 0.2, inside_xy_m=(2.0, 1.5), exact=exact) for exact in (False, True))
+    assert sampled.apart_fraction == exact.apart_fraction == 0.0
+    assert np.count_nonzero(exact.reachable) == pytest.approx(np.count_nonzero(sampled.reachable), rel=0.05)
 
 
 @pytest.mark.parametrize(("door_m", "told"), [(0.5, ["cut-off"]), (1.2, [])])

@@ -27,6 +27,8 @@ FINE_CELLS = 12
 """Cells a pass that tell what is swept; larger floors take coarser ones."""
 THIN_CELLS = 0.75
 """So many cells from walls: between two cells of which no wall lies."""
+HALF_DIAGONAL = math.sqrt(0.5)
+"""So many spacings what is interpolated between nodes is off at most."""
 SNAP_M = 0.5
 """A place whose cell is too near to a wall stands for the nearest one that is not, this near."""
 
@@ -136,6 +138,12 @@ class Floor:
         walls = field.segments_m, field.circles_m
         if exact and len(walls[0]) + len(walls[1]):
             clearance = sample_distance(float(x[0]), float(y[0]), cell_m, columns, rows, *walls)
+            # Distances to outlines say not on which side; the field does, but for less than half a diagonal
+            # between its nodes.
+            solid = (field.at(points).reshape(rows, columns) < 0.0) & (
+                clearance > HALF_DIAGONAL * field.resolution_m
+            )
+            np.negative(clearance, out=clearance, where=solid)
         else:
             clearance = field.at(points).reshape(rows, columns)
         # What lies past the bounds is no floor, though the field calls it as near as their edge.
