@@ -17,6 +17,7 @@ from rich.console import Console
 from scipy.stats import chi2
 
 from pilotage.core.types import FloatArray
+from pilotage.missions.team import LARGEST_TEAM
 from pilotage.records.run_data import read_run
 from pilotage.report import quantities, style, summary_table
 from pilotage.report.calibration.plots import MOST_BINS, histogram, panels_in_a_row
@@ -28,6 +29,7 @@ from pilotage.report.figures.placing import LabelPlacer, along
 from pilotage.report.headline import headline
 from pilotage.report.markup import Html, escape, table
 from pilotage.report.series import band, decimate, merge_spans, running_mean, spans
+from pilotage.report.team import colour_of
 from support.fabricated_run import fabricate_metrics, fabricate_run, fabricate_world
 from support.pages import page_of
 
@@ -46,6 +48,17 @@ def test_summary_table() -> None:
     assert "failed: stuck [bold]here[/bold]" in failed
     assert "nan" not in failed
     assert "outcome not said" in _printed({})
+
+
+def test_a_guard_alone_tells_of_the_intruder_as_a_team_does() -> None:
+    told = {"success": True, "reason": "over", "detected": True, "detection_time_s": 4.0}
+    assert "the intruder was detected 4.0" in headline(told).replace("\u00a0", " ")
+    assert "the intruder was not detected" in headline({**told, "detected": False})
+
+
+def test_each_robot_of_the_largest_team_has_a_colour_of_its_own() -> None:
+    """Robots 12 to 15 had those of 0 to 3: nobody could say who was where."""
+    assert len({colour_of(robot) for robot in range(LARGEST_TEAM)}) == LARGEST_TEAM
 
 
 def test_the_headline_tells_what_the_mission_was_about() -> None:

@@ -61,7 +61,7 @@ def headline(metrics: Mapping[str, Any]) -> str:
     missed = number(metrics.get("goal_error_m"))
     if not success and math.isfinite(missed) and f"{missed:.2f} m" not in answer:
         details.append(f"{quantities.length(missed)} from the goal")
-    details += _charted(metrics)
+    details += _watched(metrics) + _charted(metrics)
     lost, found = number(metrics.get("lost_s")), number(metrics.get("found_after_s"))
     if lost > 0.0:
         how = "and found itself" if math.isfinite(found) else "and did not find itself"
@@ -102,10 +102,7 @@ def _team_headline(metrics: Mapping[str, Any]) -> str:
         reason = str(metrics.get("reason") or "no reason given").strip().rstrip(".")
         answer += f" ({reason})"
     collisions, driven = number(metrics.get("collisions")), number(metrics.get("path_length_m"))
-    details, detected = [], metrics.get("detected")
-    if isinstance(detected, bool):
-        soon = f"{quantities.duration(number(metrics.get('detection_time_s')))} after he came in"
-        details.append(f"the intruder was detected {soon}" if detected else "the intruder was not detected")
+    details = _watched(metrics)
     if math.isfinite(collisions):
         text = "no collision" if collisions == 0.0 else f"{quantities.count(collisions)} collisions"
         details.append("1 collision" if collisions == 1.0 else text)
@@ -115,6 +112,15 @@ def _team_headline(metrics: Mapping[str, Any]) -> str:
     if math.isfinite(rmse):
         details.append(f"positions known to {quantities.length(rmse)} (RMSE, mean of the robots)")
     return f"{answer}; {'; '.join(details)}." if details else f"{answer}."
+
+
+def _watched(metrics: Mapping[str, Any]) -> list[str]:
+    """Whether somebody who came in was seen."""
+    detected = metrics.get("detected")
+    if not isinstance(detected, bool):
+        return []
+    soon = f"{quantities.duration(number(metrics.get('detection_time_s')))} after he came in"
+    return [f"the intruder was detected {soon}" if detected else "the intruder was not detected"]
 
 
 def _charted(metrics: Mapping[str, Any]) -> list[str]:

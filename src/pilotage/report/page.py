@@ -29,7 +29,7 @@ from pilotage.report.replay.section import replay_section, script_source, style
 from pilotage.report.replay.team import team_scene
 from pilotage.report.rounds import rounds_section
 from pilotage.report.style import drawing_style
-from pilotage.report.team import team_section, team_tiles
+from pilotage.report.team import PATROL_TILES, team_section, team_tiles
 
 OF_A_TEAM = (
     "Of the whole team: metres driven, alarms, contacts and changes of plan are sums; clearances are the "
@@ -156,6 +156,7 @@ def _tiles(run: RunData, told: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("least clearance", value("min_clearance_m"), quantities.length),
         ("NEES (ideal 3)", value("nees_mean"), lambda x: f"{x:.2f}"),
         ("collisions", value("collisions"), quantities.count),
+        *((name, value(key), write) for name, key, write in PATROL_TILES),
     )
     if run.terrain is not None or not run.trace.has("true_x_m"):
         entries += (

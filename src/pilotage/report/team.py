@@ -22,8 +22,17 @@ from pilotage.report.style import BLUE, GREEN, INK, ORANGE, PURPLE, SKY, VERMILL
 COLOURS = (
     *(BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, INK),
     *("#8a5a2b", "#a8123e", "#6a4fb0", "#7d8a12", "#0e7c86"),
+    *("#e0408f", "#58a618", "#22308f", "#8d8d8d"),
 )
-"""Of the robots in their order, over and over."""
+"""Of the robots in their order, as many as the largest team of one description has; then over again."""
+PATROL_TILES = (
+    ("intruder detected after", "detection_time_s", quantities.duration),
+    ("mean idleness", "idleness_mean_s", quantities.duration),
+    ("worst idleness", "idleness_worst_s", quantities.duration),
+    ("cyclic reference", "idleness_bound_s", quantities.duration),
+    ("floor seen lately", "coverage_fraction", quantities.share),
+)
+"""Of a patrol, by one robot or many: what a number is called, its key, how it is written."""
 SLUG, TITLE = "robots", "The robots"
 COLUMNS = (
     "path_length_m",
@@ -66,11 +75,7 @@ def team_tiles(metrics: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("worst position error", "position_max_m", quantities.length),
         ("least clearance", "min_clearance_m", quantities.length),
         ("collisions", "collisions", quantities.count),
-        ("intruder detected after", "detection_time_s", quantities.duration),
-        ("mean idleness", "idleness_mean_s", quantities.duration),
-        ("worst idleness", "idleness_worst_s", quantities.duration),
-        ("cyclic reference", "idleness_bound_s", quantities.duration),
-        ("floor seen lately", "coverage_fraction", quantities.share),
+        *PATROL_TILES,
     )
     known = [(name, write(number(metrics.get(key)))) for name, key, write in entries]
     told = [(name, text) for name, text in known if text != quantities.NOTHING]
