@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pilotage.core.errors import InputError
 from pilotage.core.types import Pose2
 from pilotage.evaluation.narrow_passages import cut_off
 from pilotage.experiments.build.build import build
@@ -24,6 +25,13 @@ def test_a_room_behind_a_door_that_is_too_narrow_is_left_out(radius_m: float, sh
     told = [event.text for event in cut_off(floor)]
     assert len(told) == (share > 0.0)
     assert all("a body 1.20 m across" in text for text in told)
+
+
+def test_a_start_with_too_little_to_spare_says_how_much_is_asked_for() -> None:
+    """It was "0.374 m from walls, found 0.38 m, but no passage so wide leads there"."""
+    floor = Floor.of(walled(8, 0.75), 0.374, 0.01, (1.0, 0.375), exact=True)
+    with pytest.raises(InputError, match=r"^start \(1, 0\.375\): .*, 0\.394 m from walls, found 0\.38 m$"):
+        floor.roomy(0.02, 0.3, (1.0, 0.375))
 
 
 def test_what_nobody_could_come_to_is_not_left_out() -> None:

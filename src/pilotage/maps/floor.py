@@ -152,7 +152,7 @@ class Floor:
         pieces, _ = scipy.ndimage.label(fits)
         floor = Floor((xmin, ymin), cell_m, radius_m, clearance, fits)
         if inside_xy_m is not None:
-            row, column = floor.nearest_cell(np.array(inside_xy_m), "the place inside")
+            row, column = floor.nearest_cell(np.array(inside_xy_m), "start")
             piece = pieces[row, column]
         else:
             sizes = np.bincount(pieces.ravel())
@@ -166,9 +166,11 @@ class Floor:
 
         All of it within ``reach_m`` of where it has so much room is kept.
         """
-        wide = replace(self, reachable=self.reachable & (self.clearance_m >= self.radius_m + spare_m))
-        pieces, _ = scipy.ndimage.label(wide.reachable)
-        piece = pieces[wide.nearest_cell(np.array(inside_xy_m), "the place inside")]
+        radius_m = self.radius_m + spare_m
+        reachable = self.reachable & (self.clearance_m >= radius_m)
+        wide = replace(self, radius_m=radius_m, reachable=reachable)
+        pieces, _ = scipy.ndimage.label(reachable)
+        piece = pieces[wide.nearest_cell(np.array(inside_xy_m), "start")]
         away_m = self.cell_m * scipy.ndimage.distance_transform_edt(pieces != piece)
         return replace(self, reachable=self.reachable & (away_m <= reach_m))
 
