@@ -134,6 +134,7 @@ def test_of_what_was_driven_the_rest_is_swept_and_no_more() -> None:
     assert not nothing.covers
     assert nothing.path is not None
     assert nothing.path.length_m < 0.1
+    assert nothing.reason.endswith(" cm²")  # so little is left at a time that it was told as 0.0 m²
     # A third of the way through it was carried off: for four metres it drove its first lines again.
     elsewhere, first = xy.copy(), len(xy) // 3
     elsewhere[first : first + 80] = xy[:80]

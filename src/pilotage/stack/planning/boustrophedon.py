@@ -118,7 +118,9 @@ class BoustrophedonPlanner:
         path = path_of_line(best, request, self._config.waypoint_spacing_m)
         took = time.perf_counter() - began
         area_m2 = np.count_nonzero(within_reach) * sought.floor.cell_m**2
-        reason = f"{path.length_m:.1f} m for {area_m2:.1f} m²"
+        # What a sweep left is less than a square metre, often much less.
+        area = f"{area_m2:.1f} m²" if area_m2 >= 1.0 else f"{1e4 * area_m2:.0f} cm²"
+        reason = f"{path.length_m:.1f} m for {area}"
         if request.trail is None:
             ratio = path.length_m * width_m / area_m2
             reason += f", {ratio:.3f} times the area over the width of a pass"
