@@ -90,6 +90,22 @@ class TestEmpty:
             assert simulator.bodies[0].stopped is stopped
 
 
+def test_who_cannot_be_put_down_yet_keeps_nobody_else_waiting_and_each_is_named() -> None:
+    """Where a mate stood for good nobody was carried any more; and a team's page did not say who was."""
+    values = two_in_a_room(20.0)
+    values["team"] |= {"starts": [{"x_m": 2.0, "y_m": 2.0}, {"x_m": 4.0, "y_m": 2.0}]}
+    values["world"] = {**values["world"], "kidnaps": []}
+    for robot, x_m in ((0, 4.0), (1, 4.2)):
+        to = {"x_m": x_m, "y_m": 2.0}
+        values["world"]["kidnaps"].append({"robot": robot, "at_s": 0.1 * (1 + robot), "to": to})
+    source = build_source(mission_of(values, seed=2))
+    disturbances, told = Disturbances(source.mission, source.simulator), []
+    for _ in range(5):
+        source.simulator.step([STOP, STOP])
+        told += [event.text for event in disturbances.due()]
+    assert told == ["robot-1: the robot is carried to (4.20, 2.00) and not told"]
+
+
 @pytest.mark.parametrize(
     ("overrides", "told"),
     [

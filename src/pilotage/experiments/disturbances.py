@@ -38,8 +38,11 @@ class Disturbances:
         """Carry out what is due now."""
         events = []
         now_s = self._source.t_s
-        while self._kidnaps and now_s >= self._kidnaps[0].at_s and self._has_room(self._kidnaps[0]):
-            events.append(carry(self._source, self._kidnaps.pop(0)))
+        for kidnap in [kidnap for kidnap in self._kidnaps if now_s >= kidnap.at_s]:
+            if self._has_room(kidnap):
+                self._kidnaps.remove(kidnap)
+                who = f"{self._names[kidnap.robot]}: " if len(self._names) > 1 else ""
+                events.append(carry(self._source, kidnap, who))
         while self._changes and now_s >= self._changes[0][0]:
             _, broken, failure = self._changes.pop(0)
             events.append(self._change(failure, broken=bool(broken)))
@@ -77,7 +80,7 @@ class Disturbances:
         return Event(self._source.t_s, "failure" if broken else "repair", text)
 
 
-def carry(source: Simulator, kidnap: Kidnap) -> Event:
+def carry(source: Simulator, kidnap: Kidnap, who: str = "") -> Event:
     """Carry a robot elsewhere; nobody tells it."""
     assert kidnap.to is not None, "settled by the build"
     to = Pose2(kidnap.to.x_m, kidnap.to.y_m, wrap_to_pi(kidnap.to.theta_rad))
@@ -85,5 +88,5 @@ def carry(source: Simulator, kidnap: Kidnap) -> Event:
     return Event(
         source.t_s,
         "kidnap",
-        f"the robot is carried to ({to.x_m:.2f}, {to.y_m:.2f}) and not told",
+        f"{who}the robot is carried to ({to.x_m:.2f}, {to.y_m:.2f}) and not told",
     )
