@@ -73,6 +73,8 @@ def test_a_keys_unit_is_its_ending() -> None:
 
 def test_small_variances_are_short_and_rounding_is_none() -> None:
     scale = Scale()
+    # Of four equal trials the interval's ends differ by rounding: they were told as 5.200000 s.
+    assert scale.decimals(5.2, 5.2 - 1e-15, 5.2 + 1e-15) == scale.decimals(5.2, 5.2, 5.2) == 3
     assert scale.write_variance(1.234e-11, 1e-3) == "1.23 · 10⁻¹¹"
     assert scale.write_variance(4.7e-5, 0.08) == "4.70 · 10⁻⁵"
     assert scale.write_variance(1.08e-23, 1.0) == "0"

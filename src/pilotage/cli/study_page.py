@@ -10,7 +10,7 @@ from pilotage.experiments.studies.attribution import attribution_of, is_attribut
 from pilotage.experiments.studies.findings import best_settings, findings_of
 from pilotage.experiments.studies.replay import mission_of_row
 from pilotage.experiments.studies.table import StudyTable, read_study
-from pilotage.records.run_data import read_run
+from pilotage.records.run_data import read_run, read_team
 from pilotage.report.drawn import map_of
 from pilotage.report.page import write_report as write_run_report
 from pilotage.report.study.examples import Example, describe, rows_to_show
@@ -52,7 +52,7 @@ def _example(table: StudyTable, title: str, row: int) -> Example:
     page = write_run_report(result.run_dir)
     run = read_run(result.run_dir)
     with drawing_style():
-        picture = map_of(run)
+        picture = map_of(read_team(result.run_dir, run))
     return Example(
         title,
         row,

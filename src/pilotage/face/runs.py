@@ -24,7 +24,7 @@ from pilotage.missions.mission import Mission
 from pilotage.records.events import read_events
 from pilotage.records.metrics import METRICS_FILE, read_metrics
 from pilotage.records.mission import read_mission
-from pilotage.records.run_data import read_run
+from pilotage.records.run_data import read_run, read_team
 from pilotage.records.trace import TRACE_FILE, read_trace
 
 MOST_TOLD = 12
@@ -229,7 +229,7 @@ def _map_html(folder: Path) -> str:
 
     data = read_run(folder)
     with drawing_style():
-        picture = map_of(data)
+        picture = map_of(read_team(folder, data))
     if not picture.svg:
         return f"<p>{html.escape(picture.caption)}</p>"
     return f'<div style="max-width:760px">{picture.svg}</div>'

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -20,6 +20,7 @@ from pilotage.report.figures.own_map import own_map_figure
 from pilotage.report.figures.patrol import patrol_figures
 from pilotage.report.figures.plan import plan_figure
 from pilotage.report.figures.pose_error import pose_error_figure
+from pilotage.report.figures.team import team_map_figure
 from pilotage.report.figures.terrain_curve import curve_figure
 from pilotage.report.figures.terrain_estimate import drive_figure, rover_error_figure, uncertainty_figure
 from pilotage.report.figures.terrain_map import (
@@ -111,8 +112,11 @@ def without_given_pose(run: RunData) -> RunData:
     return replace(run, trace=Trace(columns, run.trace.steps))
 
 
-def map_of(run: RunData) -> Illustration:
-    """Draw the one figure that shows where the run went."""
+def map_of(team: Sequence[RunData]) -> Illustration:
+    """Draw the one figure that shows where a run's robots went."""
+    if len(team) > 1:
+        return team_map_figure(team)
+    run = team[0]
     if run.terrain is not None:
         return terrain_map_figure(run) if run.terrain.ground is not None else hazard_map_figure(run)
     return map_figure(run) if run.sheet is None else path_figure(run)

@@ -38,9 +38,12 @@ class Scale:
         return f" [({self.unit})²]" if self.unit == "%" else f" [{self.unit}²]" if self.unit else ""
 
     def decimals(self, value: float, low: float, high: float) -> int:
-        """Decimals that leave two digits of an interval's half; four digits of the value without one."""
+        """Decimals that leave two digits of an interval's half; four digits of the value without one.
+
+        What rounding leaves between the ends of an interval is none.
+        """
         half = 0.5 * (high - low) * self.times
-        if math.isfinite(half) and half > 0.0:
+        if math.isfinite(half) and half > ROUNDING * abs(value * self.times):
             return min(max(1 - math.floor(math.log10(half)), 0), MAX_DECIMALS)
         size = abs(value * self.times)
         if not math.isfinite(size) or size == 0.0:
