@@ -164,6 +164,29 @@ class TestOrder:
         assert told(context) is None
 
 
+def test_who_becomes_lost_says_so_at_once() -> None:
+    """A mate that saw it where it was carried to raised the alarm before its next word was due."""
+    stack: Any = build(mission_of(hall_and_dead_end(2, 10.0), seed=0)).team[0].stack
+    context = stack._context
+    stack.step(Readings(0.0, {}))
+    context._next_word_s = math.inf
+    outbox, found = context.journal.outbox, stack._localizer.belief
+    said = len(outbox)
+    stack.step(Readings(0.1, {}))
+    assert len(outbox) == said
+    lost = replace(found, status=BeliefStatus.LOST)
+    stack._localizer = SimpleNamespace(step=lambda _: lost, belief=lost)
+    stack._wandering = SimpleNamespace(step=lambda _: Twist(0.0, 0.3))
+    for time_s in (0.2, 0.3):
+        stack.step(Readings(time_s, {}))
+        assert len(outbox) == said + 1
+    assert math.isnan(outbox[-1].x_m)
+    stack._localizer = SimpleNamespace(step=lambda _: found, belief=found)
+    stack.step(Readings(0.4, {}))
+    assert len(outbox) == said + 2
+    assert math.isfinite(outbox[-1].x_m)
+
+
 def test_who_is_lost_while_it_goes_first_tells_nobody_to_make_room() -> None:
     """Its orders stood until it knew where it was again, and the mates waited where it had sent them."""
     stack: Any = build(mission_of(hall_and_dead_end(2, 10.0), seed=0)).team[0].stack

@@ -61,6 +61,7 @@ class Context(Paths):
         self.claim: Claim | None = None
         self.clearing: Clearing | None = None
         self._has_news, self.pursuit, self.headway = False, Pursuit(), Headway()
+        self._said_lost = False
         self.battery: Battery | None = None
         if task.supply is not None:
             station = len(task.graph) + task.robot
@@ -100,11 +101,15 @@ class Context(Paths):
         super().hear(sent_s, word)
 
     def talk(self, *, lost: bool) -> None:
-        """Broadcast, where it is time to."""
-        due = self.t_s >= self._next_word_s
-        if not self.talks or not (due or self._has_news):
+        """Broadcast, where it is time to.
+
+        Who does not know any more where it is says so at once: a mate that sees it elsewhere than it last
+        said takes it for somebody else before its next word is due.
+        """
+        due, changed = self.t_s >= self._next_word_s, lost is not self._said_lost
+        if not self.talks or not (due or self._has_news or changed):
             return
-        self._has_news = False
+        self._has_news, self._said_lost = False, lost
         if due:
             self._next_word_s += self.config.message_period_s
         x, y = (math.nan, math.nan) if lost else (self.pose.x_m, self.pose.y_m)
