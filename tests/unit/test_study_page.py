@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +30,7 @@ from pilotage.experiments.studies.table import Broken, StudyTable
 from pilotage.report.study.answer import answer, answers
 from pilotage.report.study.comparisons import verdict
 from pilotage.report.study.examples import Example, describe, rows_to_show
-from pilotage.report.study.factor_figures import lines_over
+from pilotage.report.study.factor_figures import _Places, lines_over
 from pilotage.report.study.page import study_page
 
 TRIALS = 20
@@ -384,3 +385,11 @@ def test_nothing_finished_yet_is_said() -> None:
     )
     assert "No trial gave path driven" in study_page(empty)
     assert math.isnan(empty.judged().rates[0].low)
+
+
+@pytest.mark.parametrize("values", [(1.0, 2.0, 4.0, 12.0), (1.0, 2.0, 64.0), (0.0, 0.1, 50.0)])
+def test_what_stands_beside_a_value_is_nearer_to_it_than_to_any_other(values: tuple[float, ...]) -> None:
+    """Of 1, 2, 4 and 12 robots the last strategy's one stood at 1.6, the first one's two at 1.4."""
+    places = _Places(values)
+    for low, high in pairwise(values):
+        assert places.of(low, 0.0) < places.of(low, 0.45) < places.of(high, -0.45) < places.of(high, 0.0)

@@ -188,8 +188,9 @@ class _Places:
         gap = min(float(step) for step in np.diff(self._values))
         self._log = len(self._values) > 2 and first > 0.0 and last / first >= 30.0
         self._even = not self._log and gap < CROWDED * (last - first)
-        span = math.log10(last / first) if self._log else last - first
-        self._step = 1.0 if self._even else span / (len(self._values) - 1)
+        # The least step: aside of its value nothing stands nearer to another one.
+        places = np.log10(self._values) if self._log else np.array(self._values)
+        self._step = 1.0 if self._even else float(np.diff(places).min())
 
     def prepare(self, axes: Axes) -> None:
         """Give the axis its scale, its ends and its ticks; settings without a trial keep their place."""
