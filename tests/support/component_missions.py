@@ -74,8 +74,8 @@ def _stacks(role: str, name: str) -> Values:
 
 
 def _swept() -> Values:
-    """The rows of a closet."""
-    values = {**MISSIONS["sweep-floor"]}
+    """The rows of a closet, by a pass as wide as the planner's example lays them."""
+    values = {**MISSIONS["sweep-floor"], "task": {"name": "sweep-floor", "width_m": 1.0}}
     world = {"map": _box(2.0, 1.6), "start": {"x_m": 0.8, "y_m": 0.8}}
     return {**values, "world": world, "stack": {**values["stack"], "localizer": "dead-reckoning"}}
 
