@@ -11,6 +11,7 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from pilotage.core.errors import InputError
 from pilotage.logs.bags import read_bag
 from pilotage.logs.laser_log import LaserLog
 from pilotage.logs.message_types import shared, told_types
+from pilotage.logs.rosbags_extra import rosbags
 from support.laser_bags import FORMS, Drive, Scan, drive, with_scan, write_ros1, write_ros2
 
 pytest.importorskip("rosbags")
@@ -268,6 +270,27 @@ def test_types_that_have_one_name_and_other_fields_are_not_taken_for_each_other(
         one.types["own/msg/One"].__dataclass_fields__
     )
     assert shared(one) is told_types("float64  a", "own/msg/One")
+
+
+@pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
+def test_how_a_topic_was_sent_is_read_once_for_each_wording(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, storage: str
+) -> None:
+    """YAML for each topic at each opening was most of what it takes to open a bag."""
+    assert len(read_bag(write_ros2(tmp_path / storage, drive(), storage.upper()))) == 30
+    read_quality = rosbags(f"rosbag2.storage_{storage}").parse_qos
+    told: dict[str, object] = dict.fromkeys(
+        ("history", "depth", "reliability", "durability", "liveliness"), 1
+    )
+    told |= {name: {"sec": 0, "nsec": 0} for name in ("deadline", "lifespan", "liveliness_lease_duration")}
+    told["avoid_ros_namespace_conventions"] = False
+    wording = f"[{told}]"
+    once = read_quality(wording)
+    assert len(once) == 1
+    monkeypatch.setattr(rosbags("rosbag2.metadata"), "YAML", Mock(side_effect=AssertionError))
+    assert read_quality(wording) == once
+    with pytest.raises(AssertionError):
+        read_quality(f"{wording} ")
 
 
 def test_a_folder_without_metadata(tmp_path: Path) -> None:

@@ -2,7 +2,8 @@
 
 The library writes and compiles a dozen functions for each type of a store before the first message of it:
 half of what it takes to read a bag of some seconds. It makes a store anew for each bag, from definitions
-that it takes apart anew: most of what it takes to open one.
+that it takes apart anew: most of what it takes to open one. The rest is YAML: how reliably each topic was
+sent, in the same words at most of them and at each opening.
 """
 
 from __future__ import annotations
@@ -49,6 +50,8 @@ class _Open(AbstractContextManager["_Open"]):
 @cache
 def sharing(library: Any) -> Any:
     """The library's reader of bags; one whose connections tell what an earlier one's did takes its types."""
+    for storage in ("mcap", "sqlite3"):
+        _remember_qualities(rosbags(f"rosbag2.storage_{storage}"))
 
     class Reader(library):  # type: ignore[misc]
         readers: Any
@@ -71,6 +74,13 @@ def sharing(library: Any) -> Any:
             self.connections, self.typestore = connections, store
 
     return Reader
+
+
+def _remember_qualities(storage: Any) -> None:
+    """What a topic's quality of service says in YAML is read once for each wording, not for each topic."""
+    read = getattr(storage, "parse_qos", None)
+    if read is not None and not hasattr(read, "cache_info"):
+        storage.parse_qos = lru_cache(maxsize=KEPT)(read)
 
 
 @lru_cache(maxsize=KEPT)
