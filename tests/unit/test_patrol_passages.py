@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 
 from pilotage.experiments.build.build import build
-from pilotage.experiments.mission import load_mission, mission_of, read_mission
+from pilotage.experiments.mission import mission_of, read_mission
 from pilotage.maps.floor import Floor
 from pilotage.stack.patrol.graph import PatrolGraph
 from pilotage.stack.patrol.passages import Passages
 from pilotage.stack.patrol.roadmap import Roadmap
 from pilotage.stack.patrol.strategies.adaptive_rounds import AdaptiveRoundsConfig, best_plan
 from pilotage.stack.patrol.strategy import PatrolSetting
+from pilotage.stack.patrol.task import PatrolSite
 from support.patrol_floors import row, walled, with_corridor, with_door
 
 
@@ -137,11 +138,18 @@ def test_passages_of_a_map_are_followed_once(monkeypatch: pytest.MonkeyPatch) ->
         return of(floor, graph, radius_m)
 
     monkeypatch.setattr(Passages, "of", counted)
-    short = ["task.duration_s=10", "run.time_limit_s=10"]
-    one, other, larger = (
-        build(load_mission("museum-patrol", [*short, f"robot.footprint={{radius_m: {radius_m}}}"], seed)).task
-        for radius_m, seed in ((0.3, 1), (0.3, 2), (0.25, 1))
-    )
-    assert found in ([0.3, 0.25], [0.25])  # another test may have met this map
-    assert one.patrol.passages is other.patrol.passages  # type: ignore[attr-defined]
-    assert larger.patrol.passages is not one.patrol.passages  # type: ignore[attr-defined]
+    values = read_mission("museum-patrol")
+    values["world"] = rooms(1, 2)  # no other test may have met this map
+    values["team"] = {"size": 2, "strategy": "cyclic", "radio": {}}
+    values["task"], values["run"]["time_limit_s"] = {"name": "patrol", "duration_s": 1.0}, 1.0
+
+    def site(radius_m: float, seed: int) -> PatrolSite:
+        values["robot"]["footprint"] = {"radius_m": radius_m}
+        task: Any = build(mission_of(values, seed=seed)).task
+        patrol: PatrolSite = task.patrol
+        return patrol
+
+    one, other, smaller = site(0.3, 1), site(0.3, 2), site(0.25, 1)
+    assert found == [0.3, 0.25]
+    assert one.passages is other.passages
+    assert smaller.passages is not one.passages
