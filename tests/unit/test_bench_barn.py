@@ -31,7 +31,8 @@ KEYS = {
 JACKAL = np.array([[0.254, 0.215], [-0.254, 0.215], [-0.254, -0.215], [0.254, -0.215]])
 SIDES = [(x, y) for x in (-4.2, -0.3) for y in np.arange(1.0, 9.6, 0.14)]
 BOTTOM = [(x, 1.0) for x in np.arange(-4.2, -0.2, 0.14)]
-SHUT = [(x, 6.0) for x in np.arange(-4.2, -0.2, 0.14)]
+SHUT = [(x, 4.0) for x in np.arange(-4.2, -0.2, 0.14)]
+"""A metre ahead of the start: that nothing leads through is known once all poses before it were tried."""
 AHEAD = [(START[0], 6.0)]
 STRAIGHT = (
     "--set",

@@ -267,7 +267,7 @@ class TestMuseum:
             (["team.size=17"], r"team\.size: .*16"),
             (["task.graph=nowhere.graph"], r"nowhere\.graph"),
             (["team.failures=[{robot: 9, at_s: 1}]"], r"team\.failures: there is no robot 9 of 4"),
-            (["robot.motion=bicycle"], "expected a robot that turns on the spot"),
+            (["robot.motion=bicycle", "team.strategy=cyclic"], "expected a robot that turns on the spot"),
             (["team.size=null"], r"found none; .* drawn where team\.size is given"),
             (["team.starts.0={x_m: 1, y_m: 1}"], r"'team\.starts' has no entry 0 yet; give the list whole"),
         ],
