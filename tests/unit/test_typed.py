@@ -44,8 +44,9 @@ mypy_path = {ROOT / "src"}
 follow_imports = silent
 [mypy-numba.*,pyarrow.*]
 ignore_missing_imports = True
-[mypy-scipy.*,matplotlib.*,rich.*,typer.*,PIL.*,pandas.*,distributed.*,rosbags.*]
+[mypy-scipy.*,matplotlib.*,rich.*,typer.*,PIL.*,pandas.*,distributed.*,rosbags.*,yaml.*]
 follow_imports = skip
+follow_imports_for_stubs = True
 """
 """As where pilotage is installed: its signatures are read, the bodies of its functions are not checked.
 
