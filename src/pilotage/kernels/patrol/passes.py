@@ -19,12 +19,14 @@ whether legs may lead through each."""
 
 
 @kernel
-def span(leg: FloatArray, y: float, radius: float) -> tuple[float, float]:
-    """From where to where along a line of constant y a disc covers, that moves along a leg (4,).
+def span(
+    ax: float, ay: float, bx: float, by: float, nx: float, ny: float, y: float, radius: float
+) -> tuple[float, float]:
+    """From where to where along a line of constant y a disc covers, that moves from a to b.
 
-    Nowhere, where the first is the greater.
+    The sides of what it covers lie beside that leg by (nx, ny) and its negative. Nowhere, where the first is
+    the greater.
     """
-    ax, ay, bx, by = leg[0], leg[1], leg[2], leg[3]
     left, right = math.inf, -math.inf
     # Its ends are discs.
     for end in range(2):
@@ -34,9 +36,6 @@ def span(leg: FloatArray, y: float, radius: float) -> tuple[float, float]:
             left, right = min(left, x - half), max(right, x + half)
     if ay == by:
         return left, right
-    # The sides of what it covers, beside the leg.
-    share = radius / math.hypot(bx - ax, by - ay)
-    nx, ny = share * (ay - by), share * (bx - ax)
     for side in range(-1, 2, 2):
         from_y, to_y = ay + side * ny, by + side * ny
         if min(from_y, to_y) <= y <= max(from_y, to_y) and from_y != to_y:
@@ -65,34 +64,42 @@ def recount(old: FloatArray, new: FloatArray, settled: bool, ground: Ground) -> 
     x0, y0, cell = grid
     radius = 0.5 * width
     number = old.shape[0] + new.shape[0]
+    # What a leg needs at each row: its ends, its side, and between which y it covers anything.
+    legs = np.empty((number, 8))
     low_y, high_y = math.inf, -math.inf
     for k in range(number):
-        leg = old[k] if k < old.shape[0] else new[k - old.shape[0]]
-        low_y, high_y = min(low_y, leg[1], leg[3]), max(high_y, leg[1], leg[3])
+        for c in range(4):
+            legs[k, c] = old[k, c] if k < old.shape[0] else new[k - old.shape[0], c]
+        ax, ay, bx, by = legs[k, 0], legs[k, 1], legs[k, 2], legs[k, 3]
+        low_y, high_y = min(low_y, ay, by), max(high_y, ay, by)
+        share = radius / math.hypot(bx - ax, by - ay)
+        legs[k, 4], legs[k, 5] = share * (ay - by), share * (bx - ax)
+        legs[k, 6], legs[k, 7] = min(ay, by) - radius, max(ay, by) + radius
     low_row = max(0, math.ceil((low_y - radius - y0) / cell - 0.5))
     high_row = min(counts.shape[0] - 1, math.floor((high_y + radius - y0) / cell - 0.5))
-    at, by = np.empty(2 * number, np.int64), np.empty(2 * number, np.int64)
+    at, change = np.empty(2 * number, np.int64), np.empty(2 * number, np.int64)
     left_of = np.zeros(3, np.int64)
     for row in range(low_row, high_row + 1):
         y = y0 + (row + 0.5) * cell
         events = 0
         for k in range(number):
-            was = k < old.shape[0]
-            leg = old[k] if was else new[k - old.shape[0]]
-            if not min(leg[1], leg[3]) - radius <= y <= max(leg[1], leg[3]) + radius:
+            if not legs[k, 6] <= y <= legs[k, 7]:
                 continue
-            left, right = span(leg, y, radius)
+            left, right = span(
+                legs[k, 0], legs[k, 1], legs[k, 2], legs[k, 3], legs[k, 4], legs[k, 5], y, radius
+            )
             if left > right:
                 continue
             low = max(0, math.ceil((left - x0) / cell - 0.5))
             high = min(counts.shape[1] - 1, math.floor((right - x0) / cell - 0.5))
             if low <= high:
-                add_event(at, by, events, low, -1 if was else 1)
-                add_event(at, by, events + 1, high + 1, 1 if was else -1)
+                was = k < old.shape[0]
+                add_event(at, change, events, low, -1 if was else 1)
+                add_event(at, change, events + 1, high + 1, 1 if was else -1)
                 events += 2
         more = 0
         for k in range(events - 1):
-            more += by[k]
+            more += change[k]
             if more == 0:
                 continue
             for column in range(at[k], at[k + 1]):
