@@ -104,7 +104,7 @@ def test_on_a_map_ways_lead_through_what_the_outline_fits(
 
     def leads_through(number: int) -> bool:
         places = drawn(file, number).settings
-        return (places["world.start"]["x_m"] < 3.25) != (places["world.goal"]["x_m"] < 3.25)
+        return bool((places["world.start"]["x_m"] < 3.25) != (places["world.goal"]["x_m"] < 3.25))
 
     assert any(map(leads_through, range(12))) == crosses
 
