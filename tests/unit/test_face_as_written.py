@@ -61,7 +61,7 @@ def test_the_lines_run_as_written(tmp_path: Path) -> None:
     cells[:, 0] = cells[:, -1] = cells[0] = cells[-1] = True
     cells[12:, 30] = True
     write_ros_map(tmp_path / "map.yaml", RosMap.of(OccupancyGrid.of(cells, 0.1), "map.pgm"))
-    render_film(tmp_path / "film.avi", FilmScript())
+    render_film(tmp_path / "film.avi", FilmScript(frames=20))
     (tmp_path / "lines.py").write_text(SCRIPT)
     done = subprocess.run(
         [sys.executable, "-W", "error", "lines.py"],
