@@ -19,6 +19,7 @@ from pilotage.sensors.readings import Readings
 from pilotage.stack.navigator.patrol import traffic
 from pilotage.stack.navigator.patrol.config import Mode
 from pilotage.stack.navigator.patrol.context import Context
+from pilotage.stack.navigator.patrol.headway import PROGRESS_S
 from pilotage.stack.navigator.patrol.states.charging import Charging
 from pilotage.stack.navigator.patrol.states.driving import Waiting
 from pilotage.stack.navigator.patrol.states.lost import Lost
@@ -33,8 +34,8 @@ AHEAD_M = 2.5
 THERE_S = 0.1
 HOLD_S, ANEW_S = 5.0, 10.0
 """It sets out so long after it told somebody to go, whoever is still in its way, and tells all anew later."""
-MOST_S = 40.0
-"""Who does not arrive within so long lets others go first."""
+MOST_S = 20.0
+"""Who comes no nearer for so long lets others go first."""
 STAYS_RATIO = 2.25
 """Who stays within a metre for so many times as long goes first though mates visit where it is sent."""
 BEFORE_ALL = -1
@@ -49,12 +50,15 @@ class Leading:
 
     Attributes
     ----------
+    nearer_s, least_s
+        When it came nearer to its hop last, and how near in time to go.
     sent, since_s
         Where it told others to go, and from when on each; itself too, where somebody has to pass it first.
     """
 
     context: Context
-    began_s: float
+    nearer_s: float
+    least_s: float = math.inf
     sent: dict[int, Place] = field(default_factory=dict)
     since_s: dict[int, float] = field(default_factory=dict)
 
@@ -70,9 +74,11 @@ class Leading:
         line = context.roadmap.way(
             context.pose.x_m, context.pose.y_m, context.roadmap.time_s(context.hop), context.config.look_m
         )[:, :2]
-        if context.t_s - self.began_s > MOST_S or context.runs_low() or not len(line):
+        if context.motion.to_go_s < self.least_s - PROGRESS_S:
+            self.least_s, self.nearer_s = context.motion.to_go_s, context.t_s
+        if context.t_s - self.nearer_s > MOST_S or context.runs_low() or not len(line):
             context.headway.restart(context.t_s)
-            context.say("gives-up", f"not at vertex {context.hop} for {MOST_S:.0f} s: lets others go first")
+            context.say("gives-up", f"no nearer to vertex {context.hop} for {MOST_S:.0f} s: others go first")
             return to.resume(context)
         traffic.look(context, context.hop)
         if context.claim is not None:
