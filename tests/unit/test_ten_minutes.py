@@ -16,8 +16,6 @@ from support.warm_commands import pilotage
 TEXT = (Path(__file__).parents[2] / "docs/ten-minutes.md").read_text()
 AS_TYPED = {"new", "sweep"}
 """Started by a shell, as is what needs one; the others are processes of their own that import nothing."""
-FEWER = {"--trials 5": "--trials 2"}
-"""What is typed to do the same again and again is done twice."""
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 
 
@@ -79,8 +77,6 @@ def test_the_ten_minutes_run_as_they_stand(
         if language != "console":
             continue
         for typed, shown in commands(block):
-            for often, twice in FEWER.items():
-                typed = typed.replace(often, twice)
             program, *words = typed.split()
             if program == "pilotage" and words[0] not in AS_TYPED and not set(typed) & set("|\"'"):
                 done = pilotage(*words, folder=folder)
