@@ -16,7 +16,7 @@ from pilotage.maps.world_map import WorldMap
 from pilotage.stack.patrol.derive import views
 
 STAND_EVERY_M, SEE_EVERY_M = 1.0, 0.5
-WORD_BYTES = 8
+WORD_BITS = 64
 
 _GUARDS: OncePerMap[tuple[int, int]] = OncePerMap()
 
@@ -61,8 +61,6 @@ def fewest_guards(sees: BoolArray) -> tuple[int, int]:
 
 def _least(sets: BoolArray) -> BoolArray:
     """(K,) which of the sets, rows of (K, N), hold no other one; of equal ones the first."""
-    packed = np.packbits(sets, axis=1)
-    width = -(-packed.shape[1] // WORD_BYTES) * WORD_BYTES
-    words = np.zeros((len(sets), width), np.uint8)
-    words[:, : packed.shape[1]] = packed
-    return np.asarray(holding_no_other(words.view(np.uint64), sets.sum(axis=1)))
+    whole_words = np.pad(sets, ((0, 0), (0, -sets.shape[1] % WORD_BITS)))
+    words = np.ascontiguousarray(np.packbits(whole_words, axis=1)).view(np.uint64)  # of .T, too
+    return np.asarray(holding_no_other(words, sets.sum(axis=1)))

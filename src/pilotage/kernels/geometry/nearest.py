@@ -128,9 +128,7 @@ def distances_by_node(
     nodes, out = np.empty(x.shape[0], np.int64), np.empty(x.shape[0])
     # Loops that only compute, without a branch: the processor takes several points at once.
     for k in range(x.shape[0]):
-        col = min(max((x[k] - x0) / resolution + 0.5, 0.0), nx - 0.5)
-        row = min(max((y[k] - y0) / resolution + 0.5, 0.0), ny - 0.5)
-        nodes[k] = np.int64(row) * nx + np.int64(col)
+        nodes[k] = node_of(y[k], y0, resolution, ny) * nx + node_of(x[k], x0, resolution, nx)
     for k in range(x.shape[0]):
         i = of_node[nodes[k]]
         ax, ay = items[i, 0], items[i, 1]

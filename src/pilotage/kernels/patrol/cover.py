@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pilotage.kernels.arrays import BoolArray, FloatArray, IntArray
+from pilotage.kernels.arrays import BoolArray, FloatArray, IntArray, WordArray
 from pilotage.kernels.jit import kernel
 
 
@@ -56,7 +55,7 @@ def greedy_cover(sees: BoolArray, preference: FloatArray, covered: BoolArray) ->
 
 
 @kernel
-def holding_no_other(words: NDArray[np.uint64], sizes: IntArray) -> BoolArray:
+def holding_no_other(words: WordArray, sizes: IntArray) -> BoolArray:
     """(K,) which of the sets, rows of bits (K, W), hold no other one; of equal ones the first does not.
 
     ``sizes`` (K,) is how many each holds. Nearly all pairs differ in the first word of the smaller one that

@@ -56,7 +56,7 @@ def cheapest_insertion(costs: FloatArray) -> IntArray:
 def _best_gap(costs: FloatArray, order: IntArray, out: int, into: int) -> tuple[int, float]:
     """After which of a closed tour's places (N,) another lengthens it least, and by how much.
 
-    As if ``out`` were none of them; -1, and its way there and back alone where no other is left.
+    As if ``out`` were none of them; -1 and 0 where no other is left.
     """
     n, least, after = order.size, math.inf, -1
     for k in range(n):
