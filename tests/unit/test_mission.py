@@ -19,7 +19,13 @@ from pilotage.experiments.build.charts import load_chart
 from pilotage.experiments.build.obstacles import place_obstacles
 from pilotage.experiments.build.stacks import initial_belief
 from pilotage.experiments.loop import simulate
-from pilotage.experiments.mission import load_mission, mission_of, shipped_missions
+from pilotage.experiments.mission import (
+    load_mission,
+    mission_of,
+    read_mission,
+    read_parameters,
+    shipped_missions,
+)
 from pilotage.experiments.resolve import resolved_yaml
 from pilotage.experiments.values import apply_override, merge, parse_override
 from pilotage.kernels.arrays import read_only
@@ -213,6 +219,45 @@ def test_a_map_beside_its_mission_is_found(tmp_path: Path) -> None:
     loaded = load_mission(str(mission))
     assert isinstance(loaded.world.map, str)
     assert load_chart(loaded.world.map).name == "room"
+
+
+def test_files_beside_a_mission_are_found_whatever_names_them(tmp_path: Path) -> None:
+    """A mission that another one extends, a patrol's graph and one robot's own map were looked for where one
+    was, as was all that a file of parameters names; and a run's own file named them as they were."""
+    for file in ("room.yaml", "places.graph"):
+        (tmp_path / file).touch()
+    (tmp_path / "own.yaml").write_text("world: {map: room.yaml}\n")
+    robots = [{"name": "ada", "stack": {"map": "room.yaml"}}]
+    base = {"extends": "museum-patrol", "task": {"graph": "places.graph"}, "robots": robots}
+    (tmp_path / "base.yaml").write_text(yaml.safe_dump(base))
+    (tmp_path / "mine.yaml").write_text("extends: base.yaml\nmission: mine\n")
+    values = read_mission(str(tmp_path / "mine.yaml"))
+    assert values["task"]["graph"] == str(tmp_path / "places.graph")
+    assert values["robots"][0]["stack"]["map"] == str(tmp_path / "room.yaml")
+    assert read_parameters(str(tmp_path / "own.yaml"))["world"]["map"] == str(tmp_path / "room.yaml")
+    (tmp_path / "base.yaml").write_text("extends: ./mine.yaml\n")
+    with pytest.raises(InputError, match="a mission cannot extend itself"):
+        read_mission(str(tmp_path / "mine.yaml"))
+
+
+def test_a_run_s_own_file_names_files_so_that_they_are_found_from_anywhere(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "places.graph").touch()
+    monkeypatch.chdir(tmp_path)
+    mission = load_mission("museum-patrol", ["task.graph=places.graph"])
+    assert f"graph: {tmp_path / 'places.graph'}\n" in resolved_yaml(mission, MUSEUM)
+
+
+@pytest.mark.parametrize("text", ["extends: bsae.yaml\n", "extends: museum-1\nworld: {map: bsae.yaml}\n"])
+def test_what_lies_neither_beside_a_mission_nor_here_is_looked_for_beside_it(
+    tmp_path: Path, text: str
+) -> None:
+    (tmp_path / "base.yaml").touch()
+    (tmp_path / "base.png").touch()
+    (tmp_path / "mine.yaml").write_text(text)
+    with pytest.raises(InputError, match=r"did you mean '.*/base\.yaml'\?$"):
+        build(load_mission(str(tmp_path / "mine.yaml")))
 
 
 def test_a_map_may_stand_in_the_mission_itself() -> None:

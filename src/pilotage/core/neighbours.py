@@ -32,7 +32,8 @@ def hint_beside(path: Path, suffixes: Collection[str]) -> str:
         return ""
     if not names:
         return ""
-    by_stem = {Path(name).stem: name for name in sorted(names, reverse=True)}
+    alike = sorted(sorted(names, reverse=True), key=lambda name: Path(name).suffix == path.suffix)
+    by_stem = {Path(name).stem: name for name in alike}  # of two alike the one of the same suffix
     close = nearest(path.stem, sorted(by_stem))
     if close is not None:
         return f"; did you mean '{path.with_name(by_stem[close])}'?"

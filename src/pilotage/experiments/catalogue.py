@@ -121,7 +121,10 @@ def mission_schema() -> dict[str, Any]:
         "anyOf": [choices["people"], {"type": "string"}]
     }
     schema["properties"]["task"] = {"anyOf": [choices["task"], {"type": "string"}]}
-    schema["properties"]["extends"] = {"type": "string", "description": "a shipped mission to start from"}
+    schema["properties"]["extends"] = {
+        "type": "string",
+        "description": "a shipped mission or a mission's file to start from",
+    }
     return schema
 
 

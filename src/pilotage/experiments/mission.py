@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import os
 from collections.abc import Mapping, Sequence
 from importlib import resources
 from pathlib import Path
@@ -12,6 +13,7 @@ from pilotage.core.config import validate
 from pilotage.core.errors import InputError, nearest, unknown_name
 from pilotage.core.neighbours import hint_beside
 from pilotage.core.plugins import add_plugins, is_package, named_plugins
+from pilotage.experiments.named_files import anchored
 from pilotage.experiments.resolve import check_components, component_places
 from pilotage.experiments.values import apply_override, apply_setting, merge, parse_yaml, read_text
 from pilotage.missions.mission import TOP_KEYS, Mission
@@ -94,7 +96,7 @@ def read_parameters(file: str) -> dict[str, Any]:
     if not path.is_file():
         beside = hint_beside(path, {".yaml", ".yml"})
         raise InputError(f"--set '@{file}': expected a YAML file of parameters, found none there{beside}")
-    values = parse_yaml(read_text(path), file)
+    values = _at_their_places(parse_yaml(read_text(path), file), path.parent)
     unknown = [str(key) for key in values if key not in TOP_KEYS]
     if unknown:
         known = list(TOP_KEYS)
@@ -110,13 +112,11 @@ def read_mission(name_or_path: str, extended_by: tuple[str, ...] = ()) -> dict[s
     ``extended_by``: those on the way to it, which it must not extend in turn.
     """
     path = Path(name_or_path)
-    looks_like_file = path.suffix in {".yaml", ".yml"} or "/" in name_or_path
-    if looks_like_file:
+    if _is_path(name_or_path):
         if not path.is_file():
             beside = hint_beside(path, {".yaml", ".yml"})
             raise InputError(f"mission file '{name_or_path}': expected a YAML file, found none there{beside}")
-        values = parse_yaml(read_text(path), str(path))
-        _anchor_map(values, path.parent)
+        values = _at_their_places(parse_yaml(read_text(path), str(path)), path.parent)
     elif name_or_path in shipped_missions():
         values = parse_yaml((SHIPPED / f"{name_or_path}.yaml").read_text(), name_or_path)
     else:
@@ -130,36 +130,45 @@ def extended(values: dict[str, Any], where: str, extended_by: tuple[str, ...] = 
     Raises
     ------
     InputError
-        Where it extends itself or something that is no shipped mission.
+        Where it extends itself or something that is no mission.
     """
     values = dict(values)
     base = values.pop("extends", None)
     if base is None:
         return values
     if not isinstance(base, str):
-        raise InputError(f"{where}: extends: expected the name of a shipped mission, found {base}")
-    if base in (values.get("mission"), where, *extended_by):
+        raise InputError(f"{where}: extends: expected a shipped mission's name or a file, found {base}")
+    before = {_place(name) for name in (values.get("mission"), where, *extended_by) if isinstance(name, str)}
+    if _place(base) in before:
         raise InputError(f"{where}: extends: a mission cannot extend itself")
     return merge(read_mission(base, (*extended_by, where)), values)
 
 
-def _anchor_map(values: dict[str, Any], folder: Path) -> None:
-    """Let the relative paths of the world's files start from the mission file's folder."""
-    world = values.get("world")
-    if not isinstance(world, dict):
-        return
-    places = [(world, key) for key in ("map", "landmarks")]
-    if isinstance(world.get("map"), dict):
-        places += [(world["map"], key) for key in ("file", "obstacles", "environment", "landmarks")]
-    people = world.get("people")
-    if isinstance(people, list):
-        places += [(entry, "file") for entry in people if isinstance(entry, dict)]
-    stack, plugins = values.get("stack"), values.get("plugins")
-    if isinstance(stack, dict):
-        places.append((stack, "map"))
+def _is_path(name: str) -> bool:
+    """Whether a mission is named by its file."""
+    return Path(name).suffix in {".yaml", ".yml"} or "/" in name
+
+
+def _place(name: str) -> str:
+    """What is the same of all names of one mission: by links and ``..`` a file has many."""
+    return os.path.realpath(name) if _is_path(name) else name
+
+
+def _at_their_places(values: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """A file's values, the files that they name found from its folder, else from where one is.
+
+    Those that are in neither are named as if beside it, where they were meant to be.
+    """
+    placed: dict[str, Any] = anchored(values, (folder,))
+    world, plugins, base = values.get("world"), values.get("plugins"), placed.get("extends")
     if isinstance(plugins, list):
-        values["plugins"] = [name if is_package(str(name)) else str(folder / str(name)) for name in plugins]
-    for holder, key in places:
-        source = holder.get(key)
-        if isinstance(source, str) and (folder / source).is_file():
-            holder[key] = str(folder / source)
+        placed["plugins"] = [name if is_package(str(name)) else str(folder / str(name)) for name in plugins]
+    if isinstance(base, str) and _is_path(base):
+        placed["extends"] = _beside(base, folder)
+    if isinstance(world, dict) and isinstance(world.get("map"), str) and Path(world["map"]).suffix:
+        placed["world"]["map"] = _beside(placed["world"]["map"], folder)
+    return placed
+
+
+def _beside(name: str, folder: Path) -> str:
+    return name if Path(name).is_file() else str(folder / name)

@@ -13,6 +13,7 @@ from pydantic import BaseModel
 from pilotage.core.errors import InputError
 from pilotage.core.plugins import is_package, package_of
 from pilotage.experiments.build.charts import inlined
+from pilotage.experiments.named_files import anchored
 from pilotage.experiments.roles import ROLES
 from pilotage.maps.world_map import WorldMap
 from pilotage.missions.mission import Mission
@@ -51,12 +52,12 @@ def resolved_values(mission: Mission, chart: WorldMap | None = None) -> dict[str
     values["plugins"] = sorted(packages.union(filter(is_package, values["plugins"]))) + [
         name for name in values["plugins"] if not is_package(name)
     ]
-    if chart is not None:
-        values["world"]["map"] = inlined(mission.world.map, chart)
-        for choice in people:
-            if isinstance(choice.get("file"), str):
-                choice["file"] = str(Path(choice["file"]).absolute())
-    return values
+    if chart is None:
+        return values
+    placed: dict[str, Any] = anchored(values, (Path(),))
+    placed["plugins"] = values["plugins"]
+    placed["world"]["map"] = inlined(mission.world.map, chart)
+    return placed
 
 
 def check_components(mission: Mission) -> None:

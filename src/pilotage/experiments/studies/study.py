@@ -17,11 +17,12 @@ from pilotage.core.config import validate
 from pilotage.core.errors import InputError, unknown_name
 from pilotage.core.files import decoded, read_bytes
 from pilotage.experiments.mission import mission_of, read_mission, shipped_missions
+from pilotage.experiments.named_files import anchored
 from pilotage.experiments.oracles.applicable import check_oracles
 from pilotage.experiments.resolve import resolved_values
 from pilotage.experiments.studies.cells import Cell, make_cells
 from pilotage.experiments.studies.definition import StudyDefinition
-from pilotage.experiments.studies.files import anchored, digests
+from pilotage.experiments.studies.files import digests
 from pilotage.experiments.studies.groups import cell_groups
 from pilotage.experiments.studies.labels import labelled
 from pilotage.experiments.values import parse_yaml
