@@ -174,10 +174,26 @@ class TestRuns:
         straight = drive()["stack"]
         straight["navigator"] |= {"turn_rate_rad_s": 0.0, "duration_s": 5.0}
         experiment, run = finished(team(behind, ahead, stack=straight))
-        assert run.ending.startswith("collision at")
+        assert run.ending.startswith("collision of fast and slow at (")
+        assert [event.text for event in run.events if event.kind == "collision"] == [
+            "fast: the body touched something",
+            "slow: the body touched something",
+        ]
         metrics = experiment.task.judge(run).metrics
         assert metrics["success"] is False
         assert metrics["collisions"] == 2, "who is run into has touched something, too"
+
+    def test_who_was_done_before_the_run_ended_has_a_reason_of_its_own(self) -> None:
+        """Each had that of the team: a robot that had arrived, and a success, told of others' collision."""
+        soon = {**LEFT, "name": "soon", "stack": {"navigator": {"duration_s": 0.5}}}
+        experiment, run = finished(team({**RIGHT, "name": "late"}, soon, run={"time_limit_s": 1.0}))
+        metrics = experiment.task.judge(run).metrics
+        reasons = {name: one["reason"] for name, one in metrics["robots"].items()}
+        assert reasons == {
+            "late": "time limit of 1 s reached",
+            "soon": "the command was carried out to its end",
+        }
+        assert metrics["reason"] == reasons["late"]
 
     def test_the_resolved_mission_is_the_same_team(self) -> None:
         mission = team(LEFT, {**RIGHT, "name": "watch", "footprint": {"points_m": CAR}})

@@ -42,18 +42,21 @@ class SheetExploration:
         for index, attempt in enumerate(attempts):
             body, visits = attempt.body, self._visits[index]
             pose = body.pose
+            whose = f"{body.name}: " if len(attempts) > 1 else ""
             visits.add(pose.x_m, pose.y_m, t_s)
             overhang_m = self._markings.overhang_m(pose.x_m, pose.y_m, self._radii[index])
             self._rows[index] = overhang_m, float(visits.count)
             if body.collisions > self._contacts[index]:
                 self._contacts[index] = body.collisions
-                self.events.append(Event(t_s, "collision", "the body ran into a box"))
+                self.events.append(Event(t_s, "collision", f"{whose}the body ran into a box"))
             if not self._markings.holds(pose.x_m, pose.y_m):
-                self.events.append(Event(t_s, "failed", "the robot's centre left the sheet"))
+                self.events.append(Event(t_s, "failed", f"{whose}the robot's centre left the sheet"))
                 return "left the sheet"
             self._held[index] = self._held[index] + 1 if body.touching else 0
             if self._held[index] * self._dt_s > self._blocked_s:
-                self.events.append(Event(t_s, "failed", f"a box held the robot for {self._blocked_s:g} s"))
+                self.events.append(
+                    Event(t_s, "failed", f"{whose}a box held the robot for {self._blocked_s:g} s")
+                )
                 return "blocked by an obstacle"
         return "" if all_ended(attempts) else None
 

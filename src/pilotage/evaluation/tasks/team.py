@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from pilotage.evaluation.finished import FinishedRun, Verdict
+from pilotage.evaluation.finished import FinishedRun, RobotRun, Verdict
+from pilotage.stack.interface import StackStatus
 
 SUMMED = frozenset(
     {
@@ -37,16 +38,19 @@ def verdict(each: Sequence[Verdict], run: FinishedRun) -> Verdict:
 def combined(each: Sequence[dict[str, object]], run: FinishedRun) -> dict[str, object]:
     """One robot's metrics as they are; of several the sums, extremes and means, and each one's own by name.
 
-    A team succeeds if every robot does; the reason is that of the first that did not.
+    A team succeeds if every robot does; the reason is why the run ended where it is one's that did not, else
+    that of the first that did not.
     """
     if len(each) == 1:
         return each[0]
-    failed = next((entry for entry in each if not entry["success"]), None)
+    each = [entry | _own_reason(entry, robot, run) for entry, robot in zip(each, run.robots, strict=True)]
+    losers = [entry for entry in each if not entry["success"]]
+    failed = next((entry for entry in losers if entry["reason"] == run.ending), next(iter(losers), None))
     metrics: dict[str, object] = dict(each[0] if failed is None else failed)
     metrics["success"] = failed is None
     metrics.pop("final_error", None)  # of one robot, and no mean of several says anything
     names = [robot.name for robot in run.robots]
-    if failed is not None and not run.ending:
+    if failed is not None and failed["reason"] != run.ending:
         metrics["reason"] = f"{names[each.index(failed)]}: {failed['reason']}"
     for key, value in list(metrics.items()):
         values = [entry.get(key) for entry in each]
@@ -62,6 +66,14 @@ def combined(each: Sequence[dict[str, object]], run: FinishedRun) -> dict[str, o
     metrics["team_size"] = len(each)
     metrics["robots"] = {name: _own(entry) for name, entry in zip(names, each, strict=True)}
     return metrics
+
+
+def _own_reason(entry: Mapping[str, object], robot: RobotRun, run: FinishedRun) -> dict[str, object]:
+    """Who was done before the run ended, or gave up, has a reason of its own: not what happened to others."""
+    done = bool(entry["success"]) and robot.arrived
+    if entry["reason"] != run.ending or not (done or robot.status is StackStatus.FAILED):
+        return {}
+    return {"reason": robot.reason or str(robot.status)}
 
 
 def _own(entry: Mapping[str, object]) -> dict[str, object]:

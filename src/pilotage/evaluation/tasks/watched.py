@@ -25,12 +25,17 @@ class WatchedTask:
 
     def step(self, t_s: float, attempts: Sequence[Attempt]) -> str | None:
         """Over at the first collision, or when nobody is under way any more."""
-        for attempt in attempts:
-            if attempt.body.collisions:
-                self.events.append(Event(t_s, "collision", "the body touched something"))
-                pose = attempt.body.pose
-                return f"collision at ({pose.x_m:.2f}, {pose.y_m:.2f}) after {t_s:.1f} s"
-        return "" if all_ended(attempts) else None
+        touched = [attempt.body for attempt in attempts if attempt.body.collisions]
+        if not touched:
+            return "" if all_ended(attempts) else None
+        names = [body.name for body in touched] if len(attempts) > 1 else [""]
+        self.events += [
+            Event(t_s, "collision", f"{name}: the body touched something".removeprefix(": "))
+            for name in names
+        ]
+        whose = f"of {' and '.join(names)} " if len(attempts) > 1 else ""
+        pose = touched[0].pose
+        return f"collision {whose}at ({pose.x_m:.2f}, {pose.y_m:.2f}) after {t_s:.1f} s"
 
     def row(self, index: int) -> tuple[float, ...]:  # noqa: ARG002
         """Nothing beyond what every trace has."""
