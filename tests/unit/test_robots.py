@@ -187,7 +187,7 @@ class TestRuns:
         """Each had that of the team: a robot that had arrived, and a success, told of others' collision."""
         soon = {**LEFT, "name": "soon", "stack": {"navigator": {"duration_s": 0.5}}}
         experiment, run = finished(team({**RIGHT, "name": "late"}, soon, run={"time_limit_s": 1.0}))
-        metrics = experiment.task.judge(run).metrics
+        metrics: Any = experiment.task.judge(run).metrics
         reasons = {name: one["reason"] for name, one in metrics["robots"].items()}
         assert reasons == {
             "late": "time limit of 1 s reached",
