@@ -24,6 +24,7 @@ from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.readings import LidarScan, Readings
 from pilotage.stack.localization.localizer import LOCALIZERS
 from pilotage.stack.localization.particle_filter import MclConfig, ParticleFilterLocalizer
+from pilotage.stack.localization.same_witness import widening
 from support.robots import ROOM, sensors, told_of
 from support.worlds import alone, robot
 
@@ -98,6 +99,21 @@ def test_spreading_keeps_the_mean_and_the_covariance_but_for_its_growth(growth: 
     assert cov_after == pytest.approx(growth * cov, rel=0.02, abs=2e-4)
     assert (after[:, 2] < math.pi).all()
     assert (after[:, 2] >= -math.pi).all()
+
+
+def test_a_scan_that_was_let_in_whole_tells_no_more_than_one_where_scans_like_it_told_before() -> None:
+    """Known as one scan tells across, and unsure of the heading: the first is left, the second is told."""
+    scan, kept, whole = np.diag([1e-6, 1e4, 1e6]), 0.98, 0.25
+    prior = np.diag([1.0, 2e-4, 1e-3])  # along: unknown to the scan; across: better known than by one
+    known = np.linalg.inv(prior)
+    given_share = 0.4
+    posterior: FloatArray = np.asarray(np.linalg.inv(kept * known + given_share * scan), dtype=np.float64)
+    root = widening(prior, posterior, kept, given_share, whole)
+    left = np.linalg.inv(root @ posterior @ root.T)
+    across = kept * known[1, 1] + (1.0 - kept) * whole * scan[1, 1]
+    assert across == pytest.approx(left[1, 1], rel=1e-9)
+    assert left[2, 2] == pytest.approx(whole * scan[2, 2], rel=1e-9)
+    assert (np.linalg.eigvalsh(root @ posterior @ root.T - posterior) >= -1e-12).all(), "never narrower"
 
 
 def test_moments_know_the_circle() -> None:

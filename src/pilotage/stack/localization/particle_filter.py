@@ -35,6 +35,7 @@ from pilotage.stack.localization.odometry_watch import (
     OdometryWatch,
 )
 from pilotage.stack.localization.relocalization import STDS, Relocalization
+from pilotage.stack.localization.same_witness import widening
 from pilotage.stack.localization.self_check import LEAST_SEEN, ExplainedShare, SelfCheck
 
 NAME = "particle-filter"
@@ -185,7 +186,7 @@ class ParticleFilterLocalizer:
             seen = self._points_of(scan.ranges_m)
             prior = self._unweighted()
             points = self._field.mapped(seen, prior[0])
-            moments = None if self._blind else self._weigh(points)
+            moments = None if self._blind else self._weigh(points, prior[1])
             if moments is not None:
                 self._judge(prior, moments[0], points, t_s)
         if moments is None:
@@ -249,7 +250,7 @@ class ParticleFilterLocalizer:
             self._poses += stds * self._rng.standard_normal(self._poses.shape)
             self._poses[:, 2] = wrap_array_to_pi(self._poses[:, 2])
 
-    def _weigh(self, points: FloatArray) -> tuple[FloatArray, FloatArray] | None:
+    def _weigh(self, points: FloatArray, prior_cov: FloatArray) -> tuple[FloatArray, FloatArray] | None:
         """Weigh and resample the cloud by a scan's end points (K, 2) in the robot's frame; returns the
         weighted mean and covariance, None for an empty scan."""
         if not len(points):
@@ -257,7 +258,8 @@ class ParticleFilterLocalizer:
         kept, self._rounds = self._field.kept(*self._moved), 0
         self._moved = (0.0, 0.0)
         growth, whole = 1.0 / kept if kept > 0.0 else 1.0, self._field.independent_share
-        remaining, narrowing = whole * (1.0 - kept), True
+        share = whole * (1.0 - kept)
+        remaining, narrowing = share, True
         while narrowing:
             self._rounds += 1
             likelihoods = self._field.log_likelihoods(points, self._poses)
@@ -274,7 +276,17 @@ class ParticleFilterLocalizer:
             moments = _moments(self._poses, weights)
             self._resample(weights, *moments, growth)
             growth = 1.0
+        if kept > 0.0 and remaining < 0.0:
+            moments = self._widen(*moments, widening(prior_cov, moments[1], kept, share - remaining, whole))
         return moments
+
+    def _widen(self, mean: FloatArray, cov: FloatArray, wider: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Move the particles apart about their mean; returns the moments then."""
+        apart = self._poses - mean
+        apart[:, 2] = wrap_array_to_pi(apart[:, 2])
+        self._poses = mean + apart @ wider.T
+        self._poses[:, 2] = wrap_array_to_pi(self._poses[:, 2])
+        return mean, wider @ cov @ wider.T
 
     def _unweighted(self) -> tuple[FloatArray, FloatArray]:
         """Mean and covariance of the cloud as it is."""
