@@ -16,7 +16,7 @@ from pilotage.stack.patrol.roadmap import Roadmap
 from pilotage.stack.patrol.strategies.adaptive_rounds import AdaptiveRoundsConfig, best_plan
 from pilotage.stack.patrol.strategy import PatrolSetting
 from pilotage.stack.patrol.task import PatrolSite
-from support.patrol_floors import row, walled, with_corridor, with_door
+from support.patrol_floors import on_floor, row, walled, with_corridor, with_door
 
 
 @pytest.mark.parametrize(("width_m", "pieces"), [(0.8, 1), (1.0, 1), (1.3, 1), (1.8, 0), (3.0, 0)])
@@ -51,6 +51,38 @@ def test_for_lanes_a_door_is_as_wide_as_it_is(width_m: float, is_for_one: int) -
         rows, columns = np.nonzero(np.isfinite(roadmap.slowness) & (roadmap._width_m < pass_m))
         off = np.hypot(0.15 * columns - x, 0.15 * rows - 2.5 - shift_m)
         assert len(off) == 0 or (is_for_one and off.max() < 0.8)
+
+
+@pytest.mark.parametrize(("width_m", "is_for_one"), [(1.45, True), (1.58, False)])
+def test_a_corridor_is_as_wide_wherever_nodes_lie(width_m: float, is_for_one: bool) -> None:
+    """Two pass each other where half of it is no less than 0.76 m, by both of a node's widths."""
+    for shift_m in (0.0, 0.03, 0.06, 0.09, 0.12):
+        low = 1.5 + shift_m
+        walls = [(3, 0, 3, low), (3, low, 12, low), (12, low, 12, 0)]
+        high = [(x0, low + width_m + low - y0, x1, low + width_m + low - y1) for x0, y0, x1, y1 in walls]
+        world = walled(15, 2 * low + width_m, *walls, *high)
+        places = np.array([[1.5, low + 0.5 * width_m], [13.5, low + 0.5 * width_m]])
+        roadmap = Roadmap(world, places, np.zeros((0, 2)), 0.38, 1.0, 0.15, 0.5, 0.35)
+        along = roadmap.way(4.0, float(places[0, 1]), roadmap.time_s(1), 7.0)
+        told = [
+            along[:, 2].min(),
+            roadmap.narrowest_m(4.0, float(places[0, 1]), roadmap.time_s(1), 7.0, 7.0)[1],
+        ]
+        assert [room_m < 0.76 for room_m in told] == [is_for_one] * 2
+
+
+def test_doors_that_face_each_other_make_no_place_to_pass() -> None:
+    """A disc that two need lies between them, in one place; nobody waits there."""
+    low, high, doors = 4.0, 5.4, ((5.0, 5.8), (8.4, 9.4), (12.0, 12.8))
+    assert all(np.hypot(0.5 * (end - begin), 0.5 * (high - low)) > 0.76 for begin, end in doors)
+    walls: list[tuple[float, float, float, float]] = []
+    for y in (low, high):
+        edges = [0.0, *(x for door in doors for x in door), 18.0]
+        walls += [(a, y, b, y) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    places = [(0.6, 4.7), (17.4, 4.7), (5.4, 2.0), (12.4, 7.5)]
+    _, passages = on_floor(walled(18, 9.4, *walls), places, [(0, 1), (0, 2), (1, 3)])
+    (there,) = passages.stretches[0, 1]
+    assert there.end_m - there.begin_m > 15.0
 
 
 def rooms(across: int, up: int) -> dict[str, Any]:

@@ -16,6 +16,8 @@ from pilotage.core.types import FloatArray, Pose2, Twist
 from pilotage.experiments.build.build import build
 from pilotage.experiments.loop import run_loop
 from pilotage.experiments.mission import mission_of, read_mission
+from pilotage.maps.segment_map import SegmentMap
+from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.readings import Readings
 from pilotage.stack.interface import BeliefStatus
 from pilotage.stack.navigator.patrol.headway import Headway
@@ -112,6 +114,32 @@ class TestEvacuation:
         assert search.sent == given
         body = np.array([[4.0, 3.6]])
         assert not Evacuation(roadmap, line, 0, places, {}, (), body, APART_M).clear()
+
+    def test_a_corridor_full_of_robots_is_no_endless_search(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        """Four one after the other where two just fit: who pushes is pushed back, in any order."""
+        walls = [[0, 0, 24, 0], [0, 1.5, 24, 1.5], [0, 0, 0, -1.5], [0, 1.5, 0, 3], [24, 0, 24, -1.5]]
+        walls += [[24, 1.5, 24, 3], [-4, -1.5, 0, -1.5], [-4, 3, 0, 3], [-4, -1.5, -4, 3]]
+        walls += [[24, -1.5, 28, -1.5], [24, 3, 28, 3], [28, -1.5, 28, 3]]
+        geometry = SegmentMap(np.array(walls, dtype=float), np.zeros((0, 3)), (-4.0, -1.5, 28.0, 3.0))
+        corridor = WorldMap("corridor", geometry.bounds_m, geometry=geometry)
+        ends = np.array([[-2.0, 0.75], [26.0, 0.75]])
+        roadmap = Roadmap(corridor, ends, np.zeros((0, 2)), 0.38, 1.0, 0.15, 0.5, 0.35)
+        places: Places = {0: (10.6, 0.7), 1: (8.1, 0.7), 2: (7.2, 0.8), 3: (6.3, 0.8)}
+        line = roadmap.way(*places[3], roadmap.time_s(1), 5.5)[:, :2]
+        asked: list[None] = []
+        path_off = Evacuation._path_off
+
+        def counted(search: Evacuation, *args: Any) -> FloatArray | None:
+            asked.append(None)
+            assert len(asked) < 3000
+            return path_off(search, *args)
+
+        monkeypatch.setattr(Evacuation, "_path_off", counted)
+        search = Evacuation(roadmap, line, 3, places, {}, (), NOBODY, APART_M)
+        found, on_line = search.clear(), search._is_on
+        assert found == (not any(on_line(n, line) for n in (0, 1, 2)))
+        assert search._paths_left >= 0
+        assert search._paths_left == 0 or found
 
 
 class TestOrder:

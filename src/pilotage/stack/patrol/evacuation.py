@@ -15,6 +15,8 @@ AROUND_M = 8.0
 """Beyond the path nobody is sent farther than this."""
 DEEPEST = 6
 """So many push each other at most."""
+MOST_PATHS = 48
+"""So many are looked for at most; where there are places for all, a few do."""
 OFF_M = (0.25, 0.1)
 """Beyond the sum of two bodies, to keep from the path; less where there is no such place."""
 
@@ -25,7 +27,8 @@ class Evacuation:
     Each goes to the nearest place that it can reach past the others where they are or were told to go. Where
     there is none it pushes those who stand between, who then have to leave its path as well, the one who
     goes first included: as in PIBT (Okumura et al. 2022) priority is inherited, and handed back where that
-    leads nowhere. Fails where the floor around has no place left.
+    leads nowhere. Fails where the floor around has no place left, or where ``MOST_PATHS`` lead to none: who
+    pushes may be pushed back, and in a corridor full of robots there is no end of ways to try.
 
     Parameters
     ----------
@@ -65,6 +68,7 @@ class Evacuation:
         self._line, self._fixed = line_xy_m, fixed_xy_m
         self.sent = dict(sent)
         self._given = given
+        self._paths_left, self._from_lines = MOST_PATHS, dict[bytes, FloatArray]()
         x0, y0 = roadmap.origin_xy_m
         step = roadmap.spacing_m
         low = np.floor((line_xy_m.min(axis=0) - AROUND_M - (x0, y0)) / step).astype(np.int64)
@@ -123,6 +127,9 @@ class Evacuation:
         off_m: float,
     ) -> FloatArray | None:
         """(N, 2) from a robot to the nearest place off some paths, around who stands; None without one."""
+        if self._paths_left == 0:
+            return None
+        self._paths_left -= 1
         here = np.array(self._places[number])
         slow = self._slow.copy()
         taken = np.zeros(slow.shape, dtype=np.bool_)
@@ -137,10 +144,7 @@ class Evacuation:
         eikonal.sweep_down(time, slow, self._step_m)
         when = np.where(taken, np.inf, time)
         for line in lines:
-            nearest = np.full(slow.shape, np.inf)
-            for place in line:
-                np.minimum(nearest, np.hypot(*(self._nodes - place).transpose(2, 0, 1)), out=nearest)
-            when[nearest < off_m] = np.inf
+            when[self._away_m(line) < off_m] = np.inf
         best = np.unravel_index(int(np.argmin(when)), when.shape)
         if not math.isfinite(when[best]):
             return None
@@ -149,6 +153,16 @@ class Evacuation:
         steps = math.ceil(4.0 * AROUND_M / STEP_M)
         back = eikonal.way_down(x, y, time, time, self._x0, self._y0, self._step_m, STEP_M, steps)
         return np.concatenate([here[None], back[::-1, :2]])
+
+    def _away_m(self, line_xy_m: FloatArray) -> FloatArray:
+        """(rows, columns) how far nodes are from a path, worked out once for it."""
+        key = line_xy_m.tobytes()
+        if key not in self._from_lines:
+            nearest = np.full(self._slow.shape, np.inf)
+            for place in line_xy_m:
+                np.minimum(nearest, np.hypot(*(self._nodes - place).transpose(2, 0, 1)), out=nearest)
+            self._from_lines[key] = nearest
+        return self._from_lines[key]
 
     def _near(self, body: FloatArray, here: FloatArray, slow: FloatArray) -> BoolArray:
         """Nodes that a body keeps; no path leads there, but for one that it stands close to already."""

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from pilotage.core.types import BoolArray, FloatArray
+from pilotage.core.types import FloatArray
+from pilotage.kernels.geometry.field import sample_distance
 from pilotage.maps.distance_field import DistanceField
 
 EASY_M, TIGHT_FACTOR = 0.5, 1.0
@@ -17,6 +18,8 @@ DIRECTIONS, CLIMBS_M, CLIMB_RATIO = 24, (0.1, 0.3, 0.1, 0.05), 0.65
 """Steps away from walls, in the best of so many directions. Up to the middle the distance grows by as much as
 the step, beyond it along a room's corner by seven tenths (by long steps, as distances between their nodes are
 rough), along a door in a thin wall by less than this share."""
+FINER, MOST_POINTS = (5, 3), 6_000_000
+"""What has room for two is looked for at points so many times as near, while there are no more than that."""
 BEYOND_M = 0.1
 """Passages are as wide as they are up to so much more than two need."""
 
@@ -60,16 +63,42 @@ class Ground:
         free = distance >= self.clearance_m
         tight = np.clip(1.0 - (distance - self.clearance_m) / EASY_M, 0.0, 1.0)
         slowness = np.where(free, (1.0 + TIGHT_FACTOR * tight**2) / self.speed_m_s, np.inf)
-        size = 2 * min(math.ceil(self.lane_m / spacing_m), max(distance.shape)) + 1
-        room_m = scipy.ndimage.maximum_filter(distance, size=size)
-        return slowness, room_m, self._half_widths(grid, distance, free)
+        fine = self._fine(spacing_m, distance)
+        return slowness, self._room(spacing_m, fine, distance.shape), self._half_widths(fine, grid, distance)
 
-    def _half_widths(self, grid: FloatArray, distance: FloatArray, free: BoolArray) -> FloatArray:
+    def _fine(self, spacing_m: float, distance: FloatArray) -> DistanceField:
+        """Distances at points nearer to each other, exact where walls are known.
+
+        Between nodes a corridor's middle seems nearer to its walls, by up to half of what they are apart: it
+        would have room for two or not by where nodes happen to lie.
+        """
+        walls = self.field.segments_m, self.field.circles_m
+        is_exact = sum(map(len, walls)) > 0
+        most = FINER[0] if is_exact else max(1, round(spacing_m / self.field.resolution_m))
+        finer = next((f for f in FINER if f <= most and f * f * distance.size <= MOST_POINTS), 1)
+        rows, columns = (finer * (n - 1) + 1 for n in distance.shape)
+        (x0, y0), step_m = self.bounds_m[:2], spacing_m / finer
+        if is_exact:
+            values = sample_distance(x0, y0, step_m, columns, rows, *walls)
+        else:
+            xs, ys = x0 + step_m * np.arange(columns), y0 + step_m * np.arange(rows)
+            values = self.field.at(np.stack(np.meshgrid(xs, ys), axis=-1)).reshape(rows, columns)
+        return DistanceField(values, (x0, y0), step_m, *walls)
+
+    def _room(self, spacing_m: float, fine: DistanceField, shape: tuple[int, ...]) -> FloatArray:
+        """(rows, columns) the most room there is beside a node, no farther than a lane."""
+        finer = round(spacing_m / fine.resolution_m)
+        reach = min(math.ceil(self.lane_m / spacing_m), max(shape))
+        room_m = scipy.ndimage.maximum_filter(fine.distance_m, size=2 * finer * reach + 1)
+        return np.ascontiguousarray(room_m[::finer, ::finer])
+
+    def _half_widths(self, fine: DistanceField, grid: FloatArray, distance: FloatArray) -> FloatArray:
         """(rows, columns) half the width of the passage that a node lies in, or one beside it.
 
         The distance in its middle: where the way up from the node ends. Before and behind a door in a
         thin wall there is more room, but that is not its width.
         """
+        free = distance >= self.clearance_m
         enough_m = self.clearance_m + max(self.clearance_m, self.lane_m) + BEYOND_M
         half_m = np.where(free, distance, np.inf)
         low = np.flatnonzero(free & (distance < enough_m))
@@ -86,6 +115,10 @@ class Ground:
                 on = highest >= widest[climbs] + CLIMB_RATIO * climb_m
                 places[climbs[on]], widest[climbs[on]] = steps[on, best[on]], highest[on]
                 climbs = climbs[on & (highest < enough_m)]
+        # The middle itself lies within half of what the field's nodes are apart.
+        for off_m in (0.5 * self.field.resolution_m, self.field.resolution_m):
+            found = fine.at((places[:, None] + off_m * around[::4]).reshape(-1, 2)).reshape(len(low), -1)
+            widest = np.maximum(widest, found.max(axis=1, initial=0.0))
         half_m.reshape(-1)[low] = widest
         # Ways between nodes pass some that are too near to a wall.
         return np.where(free, half_m, scipy.ndimage.minimum_filter(half_m, size=3))

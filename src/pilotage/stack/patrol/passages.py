@@ -15,7 +15,7 @@ from pilotage.kernels.patrol import along
 from pilotage.maps.floor import Floor
 from pilotage.stack.patrol.graph import PatrolGraph
 
-BESIDE_M = 0.13
+BESIDE_M = 0.16
 """What two abreast keep from each other and from walls, in all, to each side of the middle."""
 ASIDE_M = 1.5
 """Between two narrow parts that are nearer to each other nobody stands aside: they are passed at once."""
@@ -106,10 +106,16 @@ OPEN = Passages()
 def narrow_cells(floor: Floor, half_m: float) -> BoolArray:
     """(rows, columns) reachable cells where two cannot pass each other.
 
-    Wide is where a disc of radius ``half_m`` lies, and what a robot in it reaches. Where two wide parts that
-    are not one touch is a door.
+    Wide is where a disc of radius ``half_m`` lies, and what a robot in it reaches: not where one lies in a
+    single place, as between two doors that face each other across a corridor, for nobody waits there. Where
+    two wide parts that are not one touch is a door.
     """
     room = floor.reachable & (floor.clearance_m >= half_m)
+    part, count = scipy.ndimage.label(room)
+    for number, (rows, columns) in enumerate(scipy.ndimage.find_objects(part), start=1):
+        long_m = floor.cell_m * math.hypot(rows.stop - rows.start, columns.stop - columns.start)
+        if count > 1 and long_m < 2.0 * floor.radius_m:
+            room[rows, columns][part[rows, columns] == number] = False
     if not room.any():
         return floor.reachable.copy()
     part, _ = scipy.ndimage.label(room)

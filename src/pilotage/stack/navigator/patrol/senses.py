@@ -34,6 +34,8 @@ NEAR_M = 1.6
 SIGMAS = 3.0
 TOLD_M, FAILED_M = 0.2, 0.35
 """What a mate may be wrong about its place by, and how far off a body is seen besides."""
+SWAY_M = 0.03
+"""What two who pass each other stray from their lanes by, in all, to each side of the middle."""
 AT_REST_M_S = 0.05
 HEARD_PERIODS = 4.0
 """Who said nothing for so many of its messages is silent, where no more are lost than of good radios."""
@@ -81,7 +83,7 @@ class Senses:
     ) -> None:
         self.config, self.task, self.journal = config, task, journal
         self.dt_s, self.radius_m, self.speed_m_s = robot.dt_s, robot.radius_m, robot.motion.top_speed_m_s
-        self.pass_m = 2.0 * self.radius_m + config.plan_margin_m + 0.5 * config.gap_m
+        self.pass_m = 2.0 * self.radius_m + config.plan_margin_m + 0.5 * config.gap_m + SWAY_M
         self._lidar, lidar = robot.one_sensor(LidarConfig, "navigator 'patrol'")
         self._odometry, _ = robot.one_sensor(WheelOdometryConfig, "navigator 'patrol'")
         radios = robot.sensors_of(RadioConfig)
