@@ -114,6 +114,10 @@ def test_a_scan_that_was_let_in_whole_tells_no_more_than_one_where_scans_like_it
     assert across == pytest.approx(left[1, 1], rel=1e-9)
     assert left[2, 2] == pytest.approx(whole * scan[2, 2], rel=1e-9)
     assert (np.linalg.eigvalsh(root @ posterior @ root.T - posterior) >= -1e-12).all(), "never narrower"
+    # All particles in one place, as odometry without noise leaves them: only the heading is widened.
+    root = widening(np.diag([0.0, 0.0, 0.3]), np.diag([0.0, 0.0, 1e-4]), kept, given_share, whole)
+    assert np.isfinite(root).all()
+    assert root[2, 2] >= 1.0
 
 
 def test_moments_know_the_circle() -> None:

@@ -7,6 +7,9 @@ import scipy
 
 from pilotage.core.types import FloatArray
 
+LEAST = 1e-15
+"""Of a variance [m^2, rad^2]: all particles may be in one place, as odometry without noise leaves them."""
+
 
 def widening(prior: FloatArray, posterior: FloatArray, kept: float, given: float, whole: float) -> FloatArray:
     """How a cloud that let in more of a scan than it should is moved apart again.
@@ -32,7 +35,7 @@ def widening(prior: FloatArray, posterior: FloatArray, kept: float, given: float
     and s (``whole`` of the scan) covariance intersection leaves kept p + (1 - kept) s, and where the scan
     alone tells more than is known, s. To first order: a scan's likelihood is taken for a normal one.
     """
-    known, w = scipy.linalg.eigh(np.linalg.inv(prior), np.linalg.inv(posterior))
+    known, w = scipy.linalg.eigh(*(np.linalg.inv(cov + LEAST * np.eye(3)) for cov in (prior, posterior)))
     scan = np.maximum(1.0 - kept * known, 0.0) * whole / given
     told = np.where(scan > known, scan, kept * known + (1.0 - kept) * scan)
     # w' posterior^-1 w = 1: as informative as it is now; only wider, never narrower.
