@@ -116,8 +116,9 @@ class Ground:
                 places[climbs[on]], widest[climbs[on]] = steps[on, best[on]], highest[on]
                 climbs = climbs[on & (highest < enough_m)]
         # The middle itself lies within half of what the field's nodes are apart.
+        ring = around[::4]
         for off_m in (0.5 * self.field.resolution_m, self.field.resolution_m):
-            found = fine.at((places[:, None] + off_m * around[::4]).reshape(-1, 2)).reshape(len(low), -1)
+            found = fine.at((places[:, None] + off_m * ring).reshape(-1, 2)).reshape(-1, len(ring))
             widest = np.maximum(widest, found.max(axis=1, initial=0.0))
         half_m.reshape(-1)[low] = widest
         # Ways between nodes pass some that are too near to a wall.
