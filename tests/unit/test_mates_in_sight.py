@@ -183,22 +183,28 @@ def three_in_a_hall() -> dict[str, Any]:
 
 
 @pytest.mark.parametrize(
-    ("radio", "within_s", "seed"),
-    [({"delay_s": 0.0}, 30.0, 3), ({"delay_s": 1.0, "loss": 0.3}, 150.0, 2)],
+    ("radio", "within_s", "seeds"),
+    [({"delay_s": 0.0}, 30.0, (1, 2, 3)), ({"delay_s": 1.0, "loss": 0.3}, 150.0, (2,))],
 )
 def test_a_robot_carried_away_in_a_bare_hall_comes_back(
-    radio: dict[str, float], within_s: float, seed: int
+    radio: dict[str, float], within_s: float, seeds: tuple[int, ...]
 ) -> None:
     """With a good radio 25 of seeds 0 to 25 after 1 to 10 s, seed 2 not within 85 s; before decision 0393
-    seed 21 after 33 s, the others after 1 to 10 s. With a bad one after 3 to 84 s (seeds 0 to 6).
+    seed 21 after 33 s, the others after 1 to 10 s. With a bad one after 3 to 84 s (seeds 0 to 6). One of
+    three may take longer, but none is wrong without saying so.
     """
-    values = three_in_a_hall()
-    values["task"]["duration_s"] = values["run"]["time_limit_s"] = within_s
-    values["team"]["radio"] |= radio
-    experiment = build(mission_of(values, seed=seed))
-    finished = run_loop(experiment).finished
-    trace = finished.robots[0].trace
-    off_m = np.hypot(trace["true_x_m"] - trace["est_x_m"], trace["true_y_m"] - trace["est_y_m"])
-    assert off_m.max() > 1.0
-    assert off_m[-1] < 0.3
-    assert experiment.task.judge(finished).metrics["collisions"] == 0
+    late = 0
+    for seed in seeds:
+        values = three_in_a_hall()
+        values["task"]["duration_s"] = values["run"]["time_limit_s"] = within_s
+        values["team"]["radio"] |= radio
+        experiment = build(mission_of(values, seed=seed))
+        finished = run_loop(experiment).finished
+        trace = finished.robots[0].trace
+        off_m = np.hypot(trace["true_x_m"] - trace["est_x_m"], trace["true_y_m"] - trace["est_y_m"])
+        assert off_m.max() > 1.0
+        silent = (off_m > 0.3) & (trace["localized"] > 0.0)
+        assert np.count_nonzero(silent) <= 2
+        late += int(off_m[-1] >= 0.3)
+        assert experiment.task.judge(finished).metrics["collisions"] == 0
+    assert late <= len(seeds) // 3
