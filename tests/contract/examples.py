@@ -13,6 +13,7 @@ import pytest
 from contract.exploring_examples import explores_the_floor
 from contract.fault_examples import fault_befalls
 from contract.local_examples import LOCAL_EXAMPLES, navigator_drives_by_the_laser
+from contract.numbers_of_sensors import tells_its_numbers
 from contract.patrol_examples import STRATEGY_NUMBERS, navigator_patrols, strategy_patrols
 from contract.people_examples import people_walk
 from contract.rover_examples import (
@@ -79,6 +80,7 @@ def sensor_reads(_: Any, config: Any) -> None:
     assert SIMULATED_SENSORS.of(config, "robot.sensors.it") is not None
     readings = [simulator({"it": config}).step(Twist(0.1, 0.0)).by_sensor["it"] for _ in range(2)]
     assert repr(readings[0]) == repr(readings[1])
+    tells_its_numbers(config, readings[:1], 0.1)
 
 
 def sensor_reads_in_any_world(_: Any, config: Any) -> None:
@@ -89,6 +91,7 @@ def sensor_reads_in_any_world(_: Any, config: Any) -> None:
     ]
     assert repr(series[0]) == repr(series[1])
     assert any(reading is not None for reading in series[0])
+    tells_its_numbers(config, series[0], 0.1)
 
 
 def localizer_follows(factory: Any, config: Any) -> None:

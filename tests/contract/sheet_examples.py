@@ -6,11 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from contract.numbers_of_sensors import tells_its_numbers
 from pilotage.core.random import RandomStreams
 from pilotage.core.types import Pose2, WheelSpeeds
 from pilotage.evaluation.sheet_visits import VisitedCells
+from pilotage.models.motion.wheel_drive import WheelDriveConfig
 from pilotage.stack.interface import StackStatus
-from support.sheets import SHEET, ToldOfSheet, sheet_sensors, sheet_simulator
+from support.sheets import DT_S, SHEET, ToldOfSheet, sheet_sensors, sheet_simulator
 
 
 def sheet_sensor_reads(_: Any, config: Any) -> None:
@@ -25,6 +27,7 @@ def sheet_sensor_reads(_: Any, config: Any) -> None:
         sim = sheet_simulator(carried, RandomStreams(1))
         readings = [sim.step(WheelSpeeds(2.0, 1.5)).by_sensor.get("it") for _ in range(40)]
         series.append([repr(reading) for reading in readings])
+        tells_its_numbers(config, readings, DT_S, WheelDriveConfig())
     assert series[0] == series[1]
     assert any(reading != "None" for reading in series[0])
 

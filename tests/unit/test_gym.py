@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 import warnings
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,10 @@ gymnasium = pytest.importorskip("gymnasium", reason="needs the extra 'gym'")
 
 import pilotage as pl  # noqa: E402
 from pilotage.bridges import gym  # noqa: E402 - registers the environments
+from pilotage.core.types import Pose2  # noqa: E402
+from pilotage.sensors.numbers import Numbers, SensorSetting  # noqa: E402
+from pilotage.sensors.sensor import SENSORS, SensorConfig  # noqa: E402
+from pilotage.sim.sensing.sensor import SIMULATED_SENSORS  # noqa: E402
 
 
 def rollout(env: Any, seed: int, steps: int = 30) -> list[Any]:
@@ -69,6 +74,100 @@ def test_the_reward_is_the_sum_of_its_terms_and_an_episode_ends() -> None:
     assert info["success"]
     assert info["reward_terms"]["reached"] == 10.0
     assert total > 11.0
+
+
+ALL = {
+    "gps": {"name": "gps"},
+    "imu": {"name": "imu"},
+    "compass": {"name": "compass"},
+    "bumper": {"name": "bumper", "sectors": 4},
+    "infrared": {"name": "infrared", "rate_hz": 10},
+    "gyroscope": {"name": "gyroscope", "rate_hz": 50},
+    "magnetometer": {"name": "magnetometer", "rate_hz": 10},
+    "radio": {"name": "radio"},
+}
+
+
+def test_every_sensor_is_observed_and_a_base_that_drives_sideways_does() -> None:
+    robot = {"motion": {"name": "omnidirectional", "max_lateral_m_s": 0.5}, "sensors": ALL}
+    mission = {"extends": "museum-1", "mission": "all", "robot": robot}
+    env = gymnasium.make(gym.OWN, mission=mission, disable_env_checker=True).unwrapped
+    before, info = env.reset(seed=1)
+    assert set(before) == {*pl.load("museum-1").robot.sensors, *ALL, "goal"} - {"radio"}
+    assert [before[name].shape[0] for name in ("gps", "bumper", "gyroscope", "odometry")] == [2, 4, 5, 3]
+    assert [one.name for one in env.numbers["gps"]] == ["x_m", "y_m"]
+    assert "gps" not in info["spoke"]
+    count = env.numbers["beacons"][0].size
+    assert ((before["beacons"][:count] < 20.0) == (before["beacons"][count:] != 0.0)).all()
+    assert env.action_space.shape == (3,)
+    for _ in range(9):
+        observation, *_, info = env.step(np.array([0.0, 0.0, 1.0], np.float32))
+        assert env.observation_space.contains(observation)
+    assert "gps" in info["spoke"]
+    assert observation["gps"] == pytest.approx([1.0, 1.4], abs=6.0)
+    assert observation["odometry"][2] == pytest.approx(0.05, abs=0.02)
+    assert (env._sim.truth.x_m, env._sim.truth.y_m) == pytest.approx((1.0, 1.41))
+
+
+@dataclass(frozen=True, slots=True)
+class Echo:
+    """A reading of a plugin."""
+
+    word: str
+    ranges_m: Any
+    loud: bool = True
+    at: Pose2 | None = None
+
+
+class Echoes(SensorConfig):
+    """What a plugin's sensor declares: nothing."""
+
+
+class FewEchoes(SensorConfig):
+    """One whose readings have several lengths."""
+
+    def as_numbers(self, setting: SensorSetting) -> tuple[Numbers, ...]:
+        assert setting.dt_s == 0.1
+        return (Numbers("ranges_m", 3, 0.0, 5.0, 5.0),)
+
+
+class EchoesOnceASecond:
+    """Pings."""
+
+    def __init__(self, *_: Any) -> None:
+        self._count = 0
+
+    def read(self) -> Echo:
+        self._count += 1
+        return Echo("ping", np.array([[1.0], [9.0]])[: self._count], at=Pose2(1.0, 2.0, 0.5))
+
+
+@pytest.fixture
+def _echoes(monkeypatch: pytest.MonkeyPatch) -> None:
+    for registry in (SENSORS, SIMULATED_SENSORS):
+        monkeypatch.setattr(registry, "_entries", dict(registry._entries))
+    for name, config in (("echoes", Echoes), ("few-echoes", FewEchoes)):
+        SENSORS.add_config(name)(config)
+        SIMULATED_SENSORS.add(config)(EchoesOnceASecond)
+
+
+@pytest.mark.usefixtures("_echoes")
+def test_a_sensor_of_ones_own_is_observed() -> None:
+    sensors = {"a": {"name": "echoes", "rate_hz": 2}, "few": {"name": "few-echoes"}}
+    mission = {"extends": "museum-1", "mission": "own", "robot": {"sensors": sensors}}
+    env = gymnasium.make(gym.OWN, mission=mission, disable_env_checker=True).unwrapped
+    assert [one.name for one in env.numbers["a"]] == ["ranges_m", "loud", "at.x_m", "at.y_m", "at.theta_rad"]
+    seen, _ = env.reset(seed=1)
+    assert (seen["a"] == 0.0).all()
+    assert seen["few"] == pytest.approx([1.0, 5.0, 5.0])
+    for _ in range(4):
+        seen, *_ = env.step(np.zeros(2, np.float32))
+    assert seen["a"] == pytest.approx([1.0, 1.0, 1.0, 2.0, 0.5])
+    assert seen["few"] == pytest.approx([1.0, 5.0, 5.0])
+    for _ in range(4):
+        env.step(np.zeros(2, np.float32))
+    with pytest.raises(pl.InputError, match=r"robot\.sensors\.a: expected 1 numbers of ranges_m at most"):
+        env.step(np.zeros(2, np.float32))
 
 
 def test_what_cannot_be_learned_is_one_line() -> None:

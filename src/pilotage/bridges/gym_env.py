@@ -4,47 +4,43 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, SupportsFloat, TypeAlias
+from typing import Any, SupportsFloat
 
 import gymnasium
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from pilotage.bridges.gym_observation import LastWords, Observation, numbers_of_sensors
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.errors import InputError
 from pilotage.core.types import Twist
-from pilotage.experiments.build.robots import motion_of, sensors_of
+from pilotage.experiments.build.robots import motion_of
 from pilotage.face.missions import MissionLike, load
 from pilotage.face.stepping import Simulation, make
 from pilotage.missions.mission import Mission
 from pilotage.missions.places import GoalConfig
-from pilotage.sensors.lidar import LidarConfig
-from pilotage.sensors.readings import LidarScan, OdometryIncrement, Readings, UltrasonicReading
-from pilotage.sensors.ultrasonic import UltrasonicConfig
-from pilotage.sensors.wheel_odometry import WheelOdometryConfig
-
-Array: TypeAlias = NDArray[np.float32]
-Observation: TypeAlias = dict[str, Array]
+from pilotage.sensors.numbers import FARTHEST_M, Numbers
+from pilotage.sensors.readings import Readings
 
 LARGEST_SEED = 2**31 - 1
 REACHED, HIT, A_STEP = 10.0, -10.0, -0.01
-FARTHEST_M = 1e6
-"""Bound of a goal's distance."""
-ODOMETRY_FACTOR = 4.0
-"""An increment's bound: so many times what the drive can do between two readings."""
+GOAL = "goal"
+GOAL_NUMBERS = (Numbers("distance_m", 1, 0.0, FARTHEST_M), Numbers.around_zero("bearing_rad", math.pi))
 
 
 class MissionEnv(gymnasium.Env[Any, Any]):
     """A mission's first goal, to be reached by one's own policy.
 
-    **Action** (2,), -1 to 1: forward speed and turn rate as shares of the motion's greatest.
+    **Action** (2,), -1 to 1: forward speed and turn rate as shares of the motion's greatest; (3,) of a motion
+    that drives sideways, the speed to the left last.
 
-    **Observation**: a mapping from the names of the robot's sensors to arrays: a LiDAR's ranges (N,) in m,
-    an ultrasonic's range (1,), a wheel odometry's distance and angle (2,) since its last reading; and
-    ``goal`` (2,), distance in m and direction in rad of the goal in the robot's frame, which is the truth (a
-    real robot would ask its localizer). A sensor that has not spoken yet reads its reach. Beacons are left
-    out: how many are in sight varies.
+    **Observation**: a mapping from the names of the robot's sensors to arrays, and ``goal`` (2,), distance in
+    m and direction in rad of the goal in the robot's frame, which is the truth (a real robot would ask its
+    localizer). What stands in an array the attribute ``numbers`` tells: names with units, how many, bounds.
+    They are what the sensor's config declares (``SensorConfig.as_numbers``), else what its first reading
+    holds, without bounds; sensors that tell no numbers, as a radio, are left out. One that has not spoken yet
+    reads its reach, or 0; ``info["spoke"]`` names those that spoke in this step.
 
     **Reward** a step, in ``info["reward_terms"]`` one by one: ``progress`` (metres by which the straight line
     to the goal became shorter), ``time`` (-0.01), ``collision`` (-10), ``reached`` (+10).
@@ -60,7 +56,8 @@ class MissionEnv(gymnasium.Env[Any, Any]):
     Raises
     ------
     InputError
-        Where the mission has several robots or no goal.
+        Where the mission has several robots or no goal, a sensor is called ``goal``, or one that declares no
+        numbers is silent.
     """
 
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 - as Gymnasium declares it
@@ -72,30 +69,19 @@ class MissionEnv(gymnasium.Env[Any, Any]):
     ) -> None:
         self.mission = load(mission, set=set)
         self._goal = goal_of(self.mission)
-        robot = self.mission.members[0]
-        motion = motion_of(robot, "robot")
-        self._top = motion.top_speed_m_s, motion.top_turn_rate_rad_s
-        self._rest: Observation = {}
-        within: dict[str, spaces.Box[Any]] = {}
-        for name, sensor in sensors_of(robot, "robot").items():
-            if isinstance(sensor, LidarConfig):
-                within[name] = _box(0.0, sensor.max_range_m, sensor.beams)
-                self._rest[name] = np.full(sensor.beams, sensor.max_range_m, dtype=np.float32)
-            elif isinstance(sensor, UltrasonicConfig):
-                within[name] = _box(0.0, sensor.max_range_m, 1)
-                self._rest[name] = np.full(1, sensor.max_range_m, dtype=np.float32)
-            elif isinstance(sensor, WheelOdometryConfig):
-                most = ODOMETRY_FACTOR * np.array(self._top) / sensor.rate_hz
-                within[name] = spaces.Box(*_both(most), dtype=np.float32)
-                self._rest[name] = np.zeros(2, dtype=np.float32)
-        within["goal"] = spaces.Box(
-            np.array([0.0, -np.pi], np.float32), np.array([FARTHEST_M, np.pi], np.float32), dtype=np.float32
-        )
-        self._within = within
-        self.observation_space = spaces.Dict({**within})
-        self.action_space = spaces.Box(*_both(np.ones(2)), dtype=np.float32)
+        motion = motion_of(self.mission.members[0], "robot")
+        top = [motion.top_speed_m_s, motion.top_turn_rate_rad_s]
+        self._top = np.array(top + [motion.top_lateral_m_s] * motion.drives_sideways)
+        sensors = numbers_of_sensors(self.mission)
+        if GOAL in sensors:
+            raise InputError(
+                f"gymnasium: robot.sensors: expected another name than '{GOAL}', which is the goal's"
+            )
+        self.numbers = {**sensors, GOAL: GOAL_NUMBERS}
+        self._words = LastWords(self.numbers)
+        self.observation_space = spaces.Dict({**self._words.spaces})
+        self.action_space = spaces.Box(-1.0, 1.0, self._top.shape, np.float32)
         self._sim: Simulation | None = None
-        self._seen: Observation = {}
         self._to_go_m = math.nan
 
     def reset(
@@ -107,17 +93,19 @@ class MissionEnv(gymnasium.Env[Any, Any]):
         if self._sim is None:
             self._sim = make(self.mission, seed=drawn)
         readings = self._sim.reset(drawn)
-        self._seen = dict(self._rest)
+        self._words.forget()
         observation = self._observed(readings)
         self._to_go_m = float(observation["goal"][0])
-        return observation, {"seed": drawn, "t_s": readings.t_s}
+        return observation, {"seed": drawn, "t_s": readings.t_s, "spoke": tuple(readings.by_sensor)}
 
-    def step(self, action: Array) -> tuple[Observation, SupportsFloat, bool, bool, dict[str, Any]]:
+    def step(
+        self, action: NDArray[np.float32]
+    ) -> tuple[Observation, SupportsFloat, bool, bool, dict[str, Any]]:
         """Drive one time step."""
         if self._sim is None:
             raise InputError("gymnasium: expected reset() before the first step, found none")
-        share = np.clip(np.asarray(action, dtype=np.float64).reshape(-1), -1.0, 1.0)
-        twist = Twist(float(share[0]) * self._top[0], float(share[1]) * self._top[1])
+        shares = np.clip(np.asarray(action, dtype=np.float64).reshape(self._top.shape), -1.0, 1.0)
+        twist = Twist(*(shares * self._top).tolist())
         readings = self._sim.step(twist)
         observation = self._observed(readings)
         to_go_m = float(observation["goal"][0])
@@ -131,30 +119,21 @@ class MissionEnv(gymnasium.Env[Any, Any]):
         }
         self._to_go_m = to_go_m
         late = readings.t_s >= self.mission.run.time_limit_s - 1e-9
-        info = {"t_s": readings.t_s, "reward_terms": terms, "success": reached and not hit}
+        info = {
+            "t_s": readings.t_s,
+            "reward_terms": terms,
+            "success": reached and not hit,
+            "spoke": tuple(readings.by_sensor),
+        }
         return observation, sum(terms.values()), reached or hit, late, info
 
     def _observed(self, readings: Readings) -> Observation:
         """The last word of every sensor, and where the goal is."""
         assert self._sim is not None, "made at reset"
-        for name, reading in readings.by_sensor.items():
-            if name not in self._within:
-                continue
-            if isinstance(reading, LidarScan):
-                self._see(name, reading.ranges_m)
-            elif isinstance(reading, UltrasonicReading):
-                self._see(name, [math.inf if reading.saturated else reading.range_m])
-            elif isinstance(reading, OdometryIncrement):
-                self._see(name, [reading.distance_m, reading.angle_rad])
         pose = self._sim.truth
         dx, dy = self._goal.x_m - pose.x_m, self._goal.y_m - pose.y_m
-        self._see("goal", [math.hypot(dx, dy), wrap_to_pi(math.atan2(dy, dx) - pose.theta_rad)])
-        return dict(self._seen)
-
-    def _see(self, name: str, values: Any) -> None:
-        """Take a reading within its bounds."""
-        box = self._within[name]
-        self._seen[name] = np.clip(np.asarray(values, dtype=np.float32), box.low, box.high)
+        self._words.see(GOAL, [math.hypot(dx, dy), wrap_to_pi(math.atan2(dy, dx) - pose.theta_rad)])
+        return self._words.hear(readings)
 
 
 def goal_of(mission: Mission) -> GoalConfig:
@@ -171,14 +150,3 @@ def goal_of(mission: Mission) -> GoalConfig:
     if goal is None:
         raise InputError(f"gymnasium: expected a mission with world.goal, found '{mission.mission}'")
     return goal
-
-
-def _both(most: Any) -> tuple[Array, Array]:
-    """Bounds on both sides of nothing."""
-    high = np.asarray(most, dtype=np.float32)
-    return -high, high
-
-
-def _box(low: float, high: float, size: int) -> spaces.Box[Any]:
-    bounds = np.full(size, low, np.float32), np.full(size, high, np.float32)
-    return spaces.Box(*bounds, dtype=np.float32)

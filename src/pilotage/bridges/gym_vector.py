@@ -14,7 +14,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from pilotage.bridges.gym_env import A_STEP, FARTHEST_M, HIT, LARGEST_SEED, REACHED, goal_of
+from pilotage.bridges.gym_env import A_STEP, HIT, LARGEST_SEED, REACHED, goal_of
 from pilotage.core.errors import InputError
 from pilotage.experiments.build.build import build_source
 from pilotage.experiments.build.robots import sensors_of
@@ -22,6 +22,7 @@ from pilotage.face.missions import MissionLike, load
 from pilotage.kernels.bodies import drive, environments
 from pilotage.models.motion.differential_drive import DifferentialDriveConfig
 from pilotage.sensors.lidar import LidarConfig
+from pilotage.sensors.numbers import FARTHEST_M
 from pilotage.sim.sensing.lidar import fan_of
 
 Observations = dict[str, NDArray[np.float32]]

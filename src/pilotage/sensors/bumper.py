@@ -6,6 +6,7 @@ import math
 
 from pydantic import Field
 
+from pilotage.sensors.numbers import Numbers, SensorSetting
 from pilotage.sensors.sensor import SENSORS, SensorConfig
 
 
@@ -19,3 +20,8 @@ class BumperConfig(SensorConfig):
 
     sectors: int = Field(default=3, ge=1, le=360)
     field_of_view_rad: float = Field(default=math.pi, gt=0.0, le=2.0 * math.pi)
+
+    def as_numbers(self, setting: SensorSetting) -> tuple[Numbers, ...]:
+        """1 of each sector that is pressed."""
+        del setting
+        return (Numbers("pressed", self.sectors, 0.0, 1.0),)

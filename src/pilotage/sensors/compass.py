@@ -6,6 +6,7 @@ import math
 
 from pydantic import Field
 
+from pilotage.sensors.numbers import Numbers, SensorSetting
 from pilotage.sensors.sensor import SENSORS, NonNegative, Positive, SensorConfig
 
 
@@ -23,3 +24,8 @@ class CompassConfig(SensorConfig):
     disturbance_rad: NonNegative = math.radians(3.0)
     """Largest error by the surroundings."""
     disturbance_length_m: Positive = 2.0
+
+    def as_numbers(self, setting: SensorSetting) -> tuple[Numbers, ...]:
+        """Its heading."""
+        del setting
+        return (Numbers.around_zero("heading_rad", math.pi),)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field
 
+from pilotage.sensors.numbers import FARTHEST_M, Numbers, SensorSetting
 from pilotage.sensors.sensor import SENSORS, NonNegative, Positive, SensorConfig
 
 
@@ -24,3 +25,8 @@ class GpsConfig(SensorConfig):
     bias_time_s: Positive = 60.0
     dropout_share: float = Field(default=0.0, ge=0.0, lt=1.0)
     """Share of readings that do not arrive, each for itself."""
+
+    def as_numbers(self, setting: SensorSetting) -> tuple[Numbers, ...]:
+        """Its position."""
+        del setting
+        return Numbers.around_zero("x_m", FARTHEST_M), Numbers.around_zero("y_m", FARTHEST_M)

@@ -6,6 +6,7 @@ import math
 
 from pydantic import Field
 
+from pilotage.sensors.numbers import MOTION_FACTOR, Numbers, SensorSetting
 from pilotage.sensors.sensor import SENSORS, NonNegative, SensorConfig
 
 
@@ -23,3 +24,8 @@ class GyroscopeConfig(SensorConfig):
     scale_error: float = Field(default=0.002, ge=0.0, lt=0.5)
     rate_std_rad_s: NonNegative = math.radians(0.15)
     """Of one reading."""
+
+    def as_numbers(self, setting: SensorSetting) -> tuple[Numbers, ...]:
+        """The rates of its samples."""
+        most = MOTION_FACTOR * setting.motion.top_turn_rate_rad_s
+        return (Numbers.around_zero("rates_rad_s", most, self.samples(setting.dt_s)),)

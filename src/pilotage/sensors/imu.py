@@ -6,6 +6,7 @@ import math
 
 from pydantic import Field
 
+from pilotage.sensors.numbers import MOTION_FACTOR, Numbers, SensorSetting
 from pilotage.sensors.sensor import SENSORS, NonNegative, SensorConfig
 
 
@@ -22,3 +23,7 @@ class ImuConfig(SensorConfig):
     """The bias walks by this much in a second (standard deviation, growing with the square root)."""
     rate_std_rad_s: NonNegative = math.radians(0.1)
     """Of one reading."""
+
+    def as_numbers(self, setting: SensorSetting) -> tuple[Numbers, ...]:
+        """Its rate."""
+        return (Numbers.around_zero("rate_rad_s", MOTION_FACTOR * setting.motion.top_turn_rate_rad_s),)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field
 
+from pilotage.sensors.numbers import Numbers, SensorSetting
 from pilotage.sensors.sensor import SENSORS, NonNegative, Positive, SensorConfig
 
 
@@ -19,3 +20,8 @@ class InfraredConfig(SensorConfig):
     min_range_m: NonNegative = 0.0
     max_range_m: Positive = 0.8
     reliable_range_m: Positive = 0.3
+
+    def as_numbers(self, setting: SensorSetting) -> tuple[Numbers, ...]:
+        """Its range, the greatest where nothing is in reach."""
+        del setting
+        return (Numbers("range_m", 1, 0.0, self.max_range_m, self.max_range_m),)

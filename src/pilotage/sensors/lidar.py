@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from pilotage.core.types import FloatArray
+from pilotage.sensors.numbers import Numbers, SensorSetting
 from pilotage.sensors.sensor import SENSORS, NonNegative, Positive, SensorConfig
 
 SURE_SHARE = 0.995
@@ -59,3 +60,8 @@ class LidarConfig(SensorConfig):
         found = np.asarray(ranges_m[nearest[there]], dtype=np.float64)
         out[there] = np.where(found >= 0.0, np.minimum(found, self.max_range_m), np.nan)
         return out
+
+    def as_numbers(self, setting: SensorSetting) -> tuple[Numbers, ...]:
+        """Its ranges."""
+        del setting
+        return (Numbers("ranges_m", self.beams, 0.0, self.max_range_m, self.max_range_m),)

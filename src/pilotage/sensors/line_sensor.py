@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field
 
+from pilotage.sensors.numbers import Numbers, SensorSetting
 from pilotage.sensors.sensor import SENSORS, NonNegative, SensorConfig
 
 
@@ -16,3 +17,8 @@ class LineSensorConfig(SensorConfig):
 
     rate_hz: float = Field(default=20.0, gt=0.0)
     edge_std_m: NonNegative = 0.001
+
+    def as_numbers(self, setting: SensorSetting) -> tuple[Numbers, ...]:
+        """1 above dark floor."""
+        del setting
+        return (Numbers("dark", 1, 0.0, 1.0),)

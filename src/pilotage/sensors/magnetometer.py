@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field
 
+from pilotage.sensors.numbers import Numbers, SensorSetting
 from pilotage.sensors.sensor import SENSORS, NonNegative, Positive, SensorConfig
 
 
@@ -23,3 +24,11 @@ class MagnetometerConfig(SensorConfig):
     field_std_ut: NonNegative = 0.4
     disturbance_ut: NonNegative = 5.0
     disturbance_length_m: Positive = 0.5
+
+    def as_numbers(self, setting: SensorSetting) -> tuple[Numbers, ...]:
+        """The field ahead and to the left."""
+        del setting
+        iron = max(abs(offset) for offset in self.hard_iron_ut)
+        field = max(1.0, self.soft_iron_ratio) * 2.0 * (self.field_ut + self.disturbance_ut)
+        most = field + iron + 10.0 * self.field_std_ut
+        return Numbers.around_zero("x_ut", most), Numbers.around_zero("y_ut", most)

@@ -6,6 +6,7 @@ from typing import Any
 
 from pydantic import Field, field_validator
 
+from pilotage.sensors.numbers import Numbers, SensorSetting
 from pilotage.sensors.sensor import SENSORS, NonNegative, Positive, SensorConfig
 
 
@@ -30,3 +31,8 @@ class RadioConfig(SensorConfig):
         if isinstance(value, int | float) and value == 0:
             raise ValueError("expected a range above 0, found 0; to have no radio set team.radio to null")
         return value
+
+    def as_numbers(self, setting: SensorSetting) -> tuple[Numbers, ...]:
+        """None: messages may be anything."""
+        del setting
+        return ()

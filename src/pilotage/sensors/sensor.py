@@ -11,6 +11,7 @@ from pilotage.core.config import Config
 from pilotage.core.errors import InputError
 from pilotage.core.registry import Registry
 from pilotage.core.types import Pose2
+from pilotage.sensors.numbers import Numbers, SensorSetting
 
 NonNegative = Annotated[float, Field(ge=0.0)]
 Positive = Annotated[float, Field(gt=0.0)]
@@ -52,6 +53,18 @@ class SensorConfig(Config):
                 f"{1.0 / (self.rate_hz * math.ceil(steps)):g}"
             )
         return whole
+
+    def samples(self, dt_s: float) -> int:
+        """How many samples a reading holds, of a sensor that is read several times in a step."""
+        return max(1, round(self.rate_hz * dt_s))
+
+    def as_numbers(self, setting: SensorSetting) -> tuple[Numbers, ...] | None:
+        """The numbers of every reading, in order; none of a sensor that tells none.
+
+        None: whichever its first reading holds, without bounds.
+        """
+        del setting
+        return None
 
 
 SENSORS: Registry[SensorConfig] = Registry("sensor", "pilotage.sensors")

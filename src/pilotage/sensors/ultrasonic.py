@@ -6,6 +6,7 @@ import math
 
 from pydantic import Field
 
+from pilotage.sensors.numbers import Numbers, SensorSetting
 from pilotage.sensors.sensor import SENSORS, NonNegative, Positive, SensorConfig
 
 
@@ -17,3 +18,8 @@ class UltrasonicConfig(SensorConfig):
     min_range_m: NonNegative = 0.05
     max_range_m: Positive = 3.0
     range_var_m2: NonNegative = 0.0
+
+    def as_numbers(self, setting: SensorSetting) -> tuple[Numbers, ...]:
+        """Its range, the greatest where nothing is in reach."""
+        del setting
+        return (Numbers("range_m", 1, 0.0, self.max_range_m, self.max_range_m),)

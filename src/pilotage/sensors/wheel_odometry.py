@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field
 
+from pilotage.sensors.numbers import MOTION_FACTOR, Numbers, SensorSetting
 from pilotage.sensors.sensor import SENSORS, NonNegative, SensorConfig
 
 CALIBRATED_DISTANCE_VAR_M2_PER_M = 1.286e-4
@@ -28,3 +29,12 @@ class WheelOdometryConfig(SensorConfig):
     distance_scale: float = Field(default=1.0, gt=0.5, lt=2.0)
     angle_scale: float = Field(default=1.0, gt=0.5, lt=2.0)
     angle_bias_rad_s: float = Field(default=0.0, gt=-1.0, lt=1.0)
+
+    def as_numbers(self, setting: SensorSetting) -> tuple[Numbers, ...]:
+        """Distance and turn; of a base that drives sideways the distance to the left besides."""
+        motion, share = setting.motion, MOTION_FACTOR / self.rate_hz
+        ahead = Numbers.around_zero("distance_m", share * motion.top_speed_m_s)
+        angle = Numbers.around_zero("angle_rad", share * motion.top_turn_rate_rad_s)
+        if not motion.drives_sideways:
+            return ahead, angle
+        return ahead, angle, Numbers.around_zero("lateral_m", share * motion.top_lateral_m_s)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, ClassVar, Self
 
 from pydantic import Field, model_validator
 
@@ -26,7 +26,7 @@ class MotionConfig(Config):
     """What every motion's data sheet says, whatever moves: its limits as a twist.
 
     A motion's config derives from this one; those whose limits follow from other numbers (a wheel drive's
-    from its wheels) override the three properties.
+    from its wheels) override the properties.
 
     Attributes
     ----------
@@ -47,10 +47,11 @@ class MotionConfig(Config):
             wrong = unfit_number(value, unlimited=may_be_infinite) or ("" if value > 0.0 else str(value))
             if wrong:
                 raise ValueError(f"expected {name} above 0, found {wrong}")
-        radius_m: Any = self.least_turning_radius_m
-        wrong = unfit_number(radius_m) or ("" if radius_m >= 0.0 else str(radius_m))
-        if wrong:
-            raise ValueError(f"expected least_turning_radius_m from 0 to {LARGEST:g}, found {wrong}")
+        for name in ("least_turning_radius_m", "top_lateral_m_s"):
+            value = getattr(self, name)
+            wrong = unfit_number(value) or ("" if value >= 0.0 else str(value))
+            if wrong:
+                raise ValueError(f"expected {name} from 0 to {LARGEST:g}, found {wrong}")
         return self
 
     @property
@@ -62,6 +63,12 @@ class MotionConfig(Config):
     def top_turn_rate_rad_s(self) -> float:
         """Fastest turn."""
         raise NotImplementedError
+
+    @property
+    def top_lateral_m_s(self) -> float:
+        """Fastest speed to either side: of a base that drives sideways as fast as forwards, where it does not
+        say another one."""
+        return self.top_speed_m_s if self.drives_sideways else 0.0
 
     @property
     def least_turning_radius_m(self) -> float:

@@ -14,3 +14,8 @@ class OmnidirectionalConfig(LimitedMotionConfig):
     drives_sideways: ClassVar[bool] = True
 
     max_lateral_m_s: Positive = 1.0
+
+    @property
+    def top_lateral_m_s(self) -> float:
+        """Fastest speed to either side."""
+        return self.max_lateral_m_s

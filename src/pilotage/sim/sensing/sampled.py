@@ -18,11 +18,6 @@ BLOCK, BLOCK_NUMBERS = 2048, 2_000_000
 """Noise is drawn for so many steps at once, of few samples; in all for so many samples at most."""
 
 
-def samples_of(rate_hz: float, carrier: Carrier) -> int:
-    """How many samples a reading holds."""
-    return max(1, round(rate_hz * carrier.dt_s))
-
-
 @SIMULATED_SENSORS.add(WheelEncodersConfig)
 class SimulatedWheelEncoders:
     """Whole counts of each wheel, spread over the samples as evenly as whole counts go."""
@@ -38,7 +33,7 @@ class SimulatedWheelEncoders:
                 f"take wheel-odometry instead"
             )
         self._counts_per_turn = config.counts_per_turn
-        self._samples = samples_of(config.rate_hz, carrier)
+        self._samples = config.samples(carrier.dt_s)
         self._counted = np.zeros(2, dtype=np.int64)
 
     def read(self) -> EncoderCounts:
@@ -59,7 +54,7 @@ class SimulatedGyroscope:
     sampled = True
 
     def __init__(self, config: GyroscopeConfig, carrier: Carrier, rng: np.random.Generator) -> None:
-        self._samples = samples_of(config.rate_hz, carrier)
+        self._samples = config.samples(carrier.dt_s)
         self._true = carrier.body.rates_rad_s
         fine = len(self._true)
         if fine % self._samples and self._samples % fine:
