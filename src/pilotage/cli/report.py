@@ -25,14 +25,15 @@ def report(
     """Write report.html into the folder of a run, study, calibration or map and print its path."""
     from pilotage.records.folder import is_study_folder
 
+    damaged: list[str] = []
     if is_study_folder(str(run)):
         from pilotage.cli.study_page import write_study_report
 
-        print(visible(str(write_study_report(run))))
-        return
-    from pilotage.report import write_report
+        page = write_study_report(run, on_left_out=damaged.append)
+    else:
+        from pilotage.report import write_report
 
-    damaged: list[str] = []
-    print(visible(str(write_report(run, damaged.append))))
+        page = write_report(run, damaged.append)
+    print(visible(str(page)))
     if damaged:
         print(f"pilotage: left out of the report: {'; '.join(damaged)}", file=sys.stderr)

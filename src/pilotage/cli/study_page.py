@@ -21,7 +21,11 @@ TRIALS = "trials"
 
 
 def write_study_report(
-    folder: Path, *, examples: bool = True, on_example: Callable[[str], None] | None = None
+    folder: Path,
+    *,
+    examples: bool = True,
+    on_example: Callable[[str], None] | None = None,
+    on_left_out: Callable[[str], None] | None = None,
 ) -> Path:
     """Write ``report.html`` into a study's folder and return its path.
 
@@ -29,6 +33,8 @@ def write_study_report(
     ----------
     examples
         Whether the worst and the median trial are run again, into ``trials`` beside the page.
+    on_left_out
+        Told, a line, of what the page is without, as where the study's plugins are gone.
 
     Raises
     ------
@@ -37,7 +43,9 @@ def write_study_report(
     """
     table = read_study(folder)
     shown: list[Example] = []
-    for title, row in rows_to_show(table) if examples else ():
+    if table.without and on_left_out is not None:
+        on_left_out(f"pictures of trials, and what metrics of plugins mean ({table.without})")
+    for title, row in rows_to_show(table) if examples and not table.without else ():
         if on_example is not None:
             on_example(f"{title.lower()}: row {row}, again for its picture")
         shown.append(_example(table, title, row))

@@ -26,20 +26,33 @@ GROUP = "pilotage.plugins"
 VARIABLE = "PILOTAGE_PLUGINS"
 """Files named here, one a line, are loaded too: so worker processes know what their parent was told."""
 
+
+class PluginError(InputError):
+    """A plugin that is not there, or does not load."""
+
+
 _loaded: dict[str, str] = {}
 _packages: dict[str, str] = {}
 """Installed packages' names, by the folder or file of their code."""
 _seen_entry_points = False
+_stand_ins: dict[str, str] = {}
+"""Files that were named beside a mission, by their names: they stand in for listed ones that were moved."""
 _in_use: dict[str, None] = {}
 """Modules from outside of which something was taken, in the order of that."""
 
 
-def add_plugins(files: Iterable[str]) -> None:
+def add_plugins(files: Iterable[str], *, listed: bool = False) -> None:
     """Load plugin files now, and in every process that this one starts; packages must be there.
+
+    Parameters
+    ----------
+    listed
+        Whether a mission lists them. One that is no longer there may be named beside the mission, where it
+        lies now: a file of its name does for it.
 
     Raises
     ------
-    InputError
+    PluginError
         Where a file is missing, does not import, or registers a name that is taken; where no such package is
         installed.
     """
@@ -48,16 +61,33 @@ def add_plugins(files: Iterable[str]) -> None:
         if is_package(file):
             load_plugins()
             if file not in _packages.values():
-                raise InputError(
+                raise PluginError(
                     f"plugins: expected a Python file or an installed package with plugins, found '{file}'; "
                     f"install it, or take it off the list"
                 )
             continue
         path = str(Path(file).absolute())
+        if listed:
+            path = _where_it_lies_now(path)
+        else:
+            _stand_ins[Path(path).name] = path
         load_file(path)
         if not _is_among(path, named):
             named.append(path)
     os.environ[VARIABLE] = "\n".join(named)
+
+
+def _where_it_lies_now(path: str) -> str:
+    """A listed file's path; that of the one named beside the mission where it is not there any more."""
+    name = Path(path).name
+    if Path(path).is_file() or Path(path).suffix != ".py":
+        return path
+    if name not in _stand_ins:
+        raise PluginError(
+            f"plugin '{path}': expected a Python file, found none there{hint_beside(Path(path), {'.py'})}; "
+            f"if it was moved, name it where it is now: --plugin FOLDER/{name}"
+        )
+    return _stand_ins[name]
 
 
 def named_plugins() -> list[str]:
@@ -110,20 +140,20 @@ def load_file(path: str) -> None:
 
     Raises
     ------
-    InputError
+    PluginError
         One line with the plugin's own file and line where it fails.
     """
     if path in _loaded:
         return
     if not Path(path).is_file() or Path(path).suffix != ".py":
         beside = hint_beside(Path(path), {".py"})
-        raise InputError(f"plugin '{path}': expected a Python file, found none there{beside}")
+        raise PluginError(f"plugin '{path}': expected a Python file, found none there{beside}")
     if _is_among(path, _loaded):
         return
     name = f"pilotage_plugin_{len(_loaded)}_{Path(path).stem}"
     spec = importlib.util.spec_from_file_location(name, path, loader=_Unwritten(name, path))
     if spec is None or spec.loader is None:
-        raise InputError(f"plugin '{path}': expected a Python file, found something else")
+        raise PluginError(f"plugin '{path}': expected a Python file, found something else")
     module = importlib.util.module_from_spec(spec)
     _loaded[path] = name
     sys.modules[name] = module
@@ -136,7 +166,7 @@ def load_file(path: str) -> None:
         # Asked for once more it is refused once more.
         del _loaded[path], sys.modules[name]
         told = str(error) if isinstance(error, InputError) else _where(error, path)
-        raise InputError(f"plugin '{path}': {told}") from None
+        raise PluginError(f"plugin '{path}': {told}") from None
 
 
 def _is_among(path: str, paths: Iterable[str]) -> bool:

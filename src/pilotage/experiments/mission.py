@@ -56,6 +56,8 @@ def mission_of(
     overrides: Sequence[str] = (),
     seed: int | None = None,
     settings: Mapping[str, Any] | None = None,
+    *,
+    recorded: bool = False,
 ) -> Mission:
     """Override and validate a mission that was read before; ``values`` stay as they are.
 
@@ -63,6 +65,8 @@ def mission_of(
     ----------
     settings
         By dotted key, values that take the mission's place, after ``overrides``.
+    recorded
+        Whether it is only read, of what has run: neither its plugins nor its components are looked for.
 
     Raises
     ------
@@ -80,10 +84,12 @@ def mission_of(
     if seed is not None:
         apply_setting(changed, "run.seed", seed)
     refuse_old_keys(changed)
+    if recorded:
+        return validate(Mission, changed, "")
     plugins = changed.get("plugins", ())
     if isinstance(plugins, list | tuple):
         names = [str(name) for name in plugins]
-        add_plugins(names)
+        add_plugins(names, listed=True)
         changed["plugins"] = [*filter(is_package, names), *named_plugins()]
     mission = validate(Mission, changed, "", more=lambda: component_places(changed))
     check_components(mission)

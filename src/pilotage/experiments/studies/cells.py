@@ -15,7 +15,7 @@ from pilotage.core.whole_number import whole_number
 from pilotage.experiments.studies.definition import CONFIGURATION, Configuration, StudyDefinition
 from pilotage.experiments.studies.factors import Factor
 
-Resolve = Callable[[Sequence[str]], Mapping[str, Any]]
+Resolve = Callable[[Sequence[str]], Mapping[str, Any] | None]
 """Overrides to the mission's values in full, every default written out."""
 
 MAX_CELLS = 10_000
@@ -60,7 +60,8 @@ def make_cells(definition: StudyDefinition, resolve: Resolve) -> tuple[Cell, ...
     ----------
     resolve
         Gives the mission's values in full under some overrides; a key that none of them knows is refused
-        with the nearest right one, and factors that multiply take their bases from it.
+        with the nearest right one, and factors that multiply take their bases from it. None of a study that
+        is only read: keys were looked at when it ran, and what multiplies is left out of the overrides.
 
     Raises
     ------
@@ -119,7 +120,7 @@ def _cell(
     configuration: Configuration | None,
     row: tuple[tuple[Factor, Any], ...],
     base: tuple[str, ...],
-    resolved: Mapping[str, Any],
+    resolved: Mapping[str, Any] | None,
     resolve: Resolve,
 ) -> Cell:
     values: dict[str, Any] = (
@@ -131,10 +132,12 @@ def _cell(
         row, key=lambda pair: pair[0].levels is None and not _names_component(pair[0].keys)
     ):
         if factor.levels is not None:
-            before = resolved
+            before = partial(_given, resolved)
             overrides = (*overrides, *as_overrides(factor.levels[value]))
             resolved = resolve(overrides)
-            _check_keys(factor.levels[value], resolved, f"level '{value}'", partial(dict, before))
+            _check_keys(factor.levels[value], resolved, f"level '{value}'", before)
+            continue
+        if factor.multiply and resolved is None:
             continue
         for key in factor.keys:
             place = _check_key(key, resolved, "factor")
@@ -146,6 +149,10 @@ def _cell(
         str(value) if factor.levels is not None else f"{factor.title}={show(value)}" for factor, value in row
     ]
     return Cell(index, ", ".join(words) or "mission", values, overrides, {})
+
+
+def _given(values: Mapping[str, Any] | None) -> Mapping[str, Any] | None:
+    return values
 
 
 def show(value: Any) -> str:
@@ -161,9 +168,9 @@ def _times(base: Any, factor: float, key: str) -> Any:
 
 def _check_keys(
     settings: Mapping[str, Any],
-    resolved: Mapping[str, Any],
+    resolved: Mapping[str, Any] | None,
     where: str,
-    before: Callable[[], Mapping[str, Any]],
+    before: Callable[[], Mapping[str, Any] | None],
 ) -> None:
     """Refuse keys that the mission does not know; what is taken off (null) it has to know ``before``."""
     for key, value in settings.items():
@@ -175,7 +182,7 @@ def _check_keys(
             _check_key(key, before(), where)
 
 
-def _check_key(key: str, resolved: Mapping[str, Any], where: str) -> Any:
+def _check_key(key: str, resolved: Mapping[str, Any] | None, where: str) -> Any:
     """What a key holds in the mission in full; InputError with the nearest name where there is no such."""
     place: Any = resolved
     parts = key.split(".")

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 from pilotage.core.errors import InputError
 from pilotage.core.whole_number import whole_number
 from pilotage.experiments.studies.database import DATABASE
 from pilotage.experiments.studies.rows import read_essence
-from pilotage.experiments.studies.study import Study, changes_told, differences, load_study
+from pilotage.experiments.studies.study import Study, changes_told, is_made_from, load_study
 from pilotage.experiments.studies.trial import TrialRunner
 from pilotage.missions.mission import Mission
 
@@ -59,7 +58,7 @@ def mission_from(text: str) -> Mission:
     folder, row = parse_row(text)
     study = load_study(str(folder.resolve()))
     made_from = read_essence(folder / DATABASE)
-    if made_from is not None and differences(made_from, json.loads(json.dumps(study.essence()))):
+    if made_from is not None and not is_made_from(study, made_from):
         raise InputError(
             f"--from '{text}': expected the files that the study was made from, found them changed "
             f"({changes_told(made_from, study)}); no row can be run again as it was"

@@ -34,7 +34,7 @@ from pilotage.experiments.studies.database import (
     telling,
 )
 from pilotage.experiments.studies.owners import ENDED, hear, others
-from pilotage.experiments.studies.study import Study, changes_told
+from pilotage.experiments.studies.study import Study, changes_told, is_made_from
 from pilotage.experiments.studies.trial import Outcome, Task
 from pilotage.records.folder import STUDY_FILE
 
@@ -237,9 +237,12 @@ class Store:
         found = dict(self._db.execute("select key, value from meta").fetchall())
         if found.get("digest") == study.digest:
             return
+        made_from = load_json(found.get("essence", "{}"), str(self.path))
+        if is_made_from(study, made_from):
+            return
         raise InputError(
             f"{self.path.parent}: expected the study that it was made for, found another definition "
-            f"({changes_told(load_json(found.get('essence', '{}'), str(self.path)), study)}); "
+            f"({changes_told(made_from, study)}); "
             "give it another name or folder"
         )
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
@@ -16,6 +17,7 @@ import yaml
 from pilotage.core.config import validate
 from pilotage.core.errors import InputError, unknown_name
 from pilotage.core.files import decoded, read_bytes
+from pilotage.core.plugins import PluginError, is_package
 from pilotage.experiments.mission import mission_of, read_mission, shipped_missions
 from pilotage.experiments.named_files import anchored
 from pilotage.experiments.oracles.applicable import check_oracles
@@ -108,16 +110,22 @@ def shipped_studies() -> list[str]:
     )
 
 
-def load_study(name_or_path: str, changes: Mapping[str, Any] | None = None) -> Study:
+def load_study(
+    name_or_path: str, changes: Mapping[str, Any] | None = None, *, recorded: bool = False
+) -> Study:
     """Read a study by its shipped name, its file or its folder, and make it ready.
 
     Parameters
     ----------
     changes
         Laid over the file's top keys, such as ``trials``.
+    recorded
+        As ``make_study`` takes it.
 
     Raises
     ------
+    PluginError
+        For a plugin that is not there or does not load.
     InputError
         One line: what was expected, what was found, the nearest right name.
     """
@@ -137,13 +145,18 @@ def load_study(name_or_path: str, changes: Mapping[str, Any] | None = None) -> S
         raise unknown_name("study", name_or_path, shipped_studies())
     try:
         definition = validate(StudyDefinition, {**values, **(changes or {})}, "")
-        return make_study(definition, folder)
+        return make_study(definition, folder, recorded=recorded)
     except InputError as error:
-        raise InputError(f"study '{name_or_path}': {error}") from None
+        kind = PluginError if isinstance(error, PluginError) else InputError
+        raise kind(f"study '{name_or_path}': {error}") from None
 
 
 def make_study(
-    definition: StudyDefinition, folder: Path = Path(), values: Mapping[str, Any] | None = None
+    definition: StudyDefinition,
+    folder: Path = Path(),
+    values: Mapping[str, Any] | None = None,
+    *,
+    recorded: bool = False,
 ) -> Study:
     """Read the mission and validate every cell of a study.
 
@@ -153,6 +166,8 @@ def make_study(
         Where a mission's file is looked for.
     values
         The mission itself, where it is in no file.
+    recorded
+        Whether its rows are only read: cells were looked at when they ran, and plugins are not loaded.
 
     Raises
     ------
@@ -166,7 +181,9 @@ def make_study(
     base = anchored(read_mission(named) if values is None else dict(values), places)
     definition = _at_their_places(definition, places)
 
-    def resolve(overrides: Sequence[str]) -> Mapping[str, Any]:
+    def resolve(overrides: Sequence[str]) -> Mapping[str, Any] | None:
+        if recorded:
+            return None
         mission = mission_of(base, overrides)
         check_oracles(mission)
         return resolved_values(mission)
@@ -174,13 +191,14 @@ def make_study(
     cells = make_cells(definition, resolve)
     if len(cells) * definition.trials > MAX_ROWS:
         raise InputError(f"expected at most {MAX_ROWS} rows, found {len(cells)} cells of {definition.trials}")
-    plugins = dict.fromkeys(base.get("plugins") or ())
+    plugins: dict[str, None] = {}
     for cell in cells:
         try:
-            plugins |= dict.fromkeys(resolve(cell.overrides)["plugins"])
+            plugins |= dict.fromkeys((resolve(cell.overrides) or {}).get("plugins", ()))
         except InputError as error:
             raise InputError(f"cell '{cell.name}': {error}") from None
-    if plugins:  # those of the command line too: the study's folder runs again without them
+    # Those of the command line too, and where they lie now: the study's folder runs again without it.
+    if plugins:
         base = {**base, "plugins": list(plugins)}
     names = [cell.name for cell in cells]
     if definition.baseline is not None and definition.baseline not in names:
@@ -240,6 +258,11 @@ def mission_yaml(study: Study) -> str:
     return yaml.safe_dump(dict(study.base), sort_keys=False, allow_unicode=True)
 
 
+def is_made_from(study: Study, essence: Mapping[str, Any]) -> bool:
+    """Whether an essence that was recorded is the study's."""
+    return not differences(essence, json.loads(json.dumps(study.essence())))
+
+
 def changes_told(old: Mapping[str, Any], study: Study) -> str:
     """What changed from an essence to a study's, ``key: old -> new``; the first three and how many more."""
     changed = differences(old, json.loads(json.dumps(study.essence())))
@@ -248,13 +271,32 @@ def changes_told(old: Mapping[str, Any], study: Study) -> str:
 
 
 def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
-    """What changed between two essences, ``key: old -> new`` each."""
-    before, after = _flat(old), _flat(new)
+    """What changed between two essences, ``key: old -> new`` each; a plugin may have been moved."""
+    before, after = _flat(_by_names(old)), _flat(_by_names(new))
     return [
         f"{key}: {_short(before.get(key, 'nothing'))} -> {_short(after.get(key, 'nothing'))}"
         for key in [*before, *(key for key in after if key not in before)]
         if before.get(key, _Missing) != after.get(key, _Missing)
     ]
+
+
+def _by_names(essence: Mapping[str, Any]) -> Mapping[str, Any]:
+    """An essence with its plugin files by their names: the same file elsewhere gives the same rows."""
+    mission, files = essence.get("mission"), essence.get("files")
+    plugins = mission.get("plugins") if isinstance(mission, Mapping) else None
+    if not isinstance(mission, Mapping) or not isinstance(files, Mapping) or not isinstance(plugins, list):
+        return essence
+    paths = dict.fromkeys(str(Path(name).resolve()) for name in plugins if not is_package(name))
+    count = Counter(Path(path).name for path in paths)
+    named = {path: Path(path).name for path in paths if count[Path(path).name] == 1}
+    return {
+        **essence,
+        "mission": {
+            **mission,
+            "plugins": sorted({named.get(str(Path(name).resolve()), name) for name in plugins}),
+        },
+        "files": {named.get(path, path): digest for path, digest in files.items()},
+    }
 
 
 class _Missing:

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from pilotage.core.errors import InputError
+from pilotage.core.plugins import PluginError
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.evaluation.endings import ending_of
 from pilotage.evaluation.judge import SUCCESS, Judgement, judge
@@ -55,6 +56,8 @@ class StudyTable:
         How many are still to run.
     ended
         Why each trial that is done ended, as ``evaluation.endings`` counts it.
+    without
+        Why a plugin that it ran with is not there; empty: all are. No trial can be run again then.
     """
 
     study: Study
@@ -67,6 +70,7 @@ class StudyTable:
     broken: tuple[Broken, ...]
     waiting: int
     ended: tuple[str, ...] = ()
+    without: str = ""
 
     @property
     def given(self) -> list[str]:
@@ -78,7 +82,7 @@ class StudyTable:
         """The metrics that matter: what the definition asks for, else what judges the task."""
         if self.study.definition.metrics:
             return self.study.definition.metrics
-        mission = mission_of(dict(self.study.base), self.study.cells[0].overrides)
+        mission = mission_of(self.study.base, self.study.cells[0].overrides, recorded=True)
         costs = METRICS.costs_of(mission.task.name, self.given)
         # Where nothing is asked for, accuracy answers before time does.
         judging = sorted(costs, key=lambda metric: metric.aspect is not Aspect.ACCURACY)
@@ -175,7 +179,7 @@ class StudyTable:
 
 
 def read_study(folder: Path) -> StudyTable:
-    """Read a study's folder; also while it runs.
+    """Read a study's folder; also while it runs, and where its plugins are gone.
 
     Raises
     ------
@@ -183,7 +187,11 @@ def read_study(folder: Path) -> StudyTable:
         Where it is no study's folder, or its database is corrupt: what can be read of it is then beside
         it, in ``trials-salvaged.csv``.
     """
-    study = load_study(str(folder))
+    without = ""
+    try:
+        study = load_study(str(folder))
+    except PluginError as error:
+        study, without = load_study(str(folder), recorded=True), str(error)
     rows, trouble = read_rows(folder / DATABASE)
     if trouble:
         raise save_what_is_left(folder, study, trouble)
@@ -215,4 +223,5 @@ def read_study(folder: Path) -> StudyTable:
         broken,
         waiting,
         tuple(ending_of(row["metrics"]) for row in done),
+        without,
     )
