@@ -18,10 +18,14 @@ from pilotage.experiments.run import run_mission
 from pilotage.kernels.geometry import chain
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.sensors.readings import Readings
+from pilotage.sim.source import Simulator
+from pilotage.sim.worlds.world import World
 from pilotage.stack.control.pi_follower import PiFollower, PiFollowerConfig
 from pilotage.stack.interface import Belief, BeliefStatus, StackStatus
 from pilotage.stack.localization.ekf_landmarks import EkfLandmarkLocalizer
 from pilotage.stack.localization.landmark_filter import LandmarkFilterConfig
+from pilotage.stack.mapping.mapper import Mapper
+from pilotage.stack.mapping.obstacle_layer import ObstacleLayer, ObstacleLayerConfig
 from pilotage.stack.navigator.goal import GoalNavigator
 from pilotage.stack.navigator.goal_config import GoalNavigatorConfig, Mode
 from pilotage.stack.navigator.navigator import Parts
@@ -30,7 +34,7 @@ from pilotage.stack.planning.planner import PLANNERS
 from pilotage.stack.planning.rrt_star_dubins import RrtStarDubinsConfig, RrtStarDubinsPlanner
 from support.missions import reach
 from support.robots import ROOM, Told, sensors, told_of
-from support.worlds import alone, robot, walled
+from support.worlds import ROOM_MAP, alone, robot, walled
 
 START = Pose2(2.0, 2.0, 0.0)
 
@@ -45,7 +49,16 @@ class Stub:
         return self.belief
 
 
-def navigator(told: Told, localizer: object) -> GoalNavigator:
+class MapsNothing:
+    """A mapper of one's own."""
+
+    circles_m = np.zeros((0, 3))
+
+    def step(self, readings: Readings, belief: Belief) -> bool:  # noqa: ARG002
+        return False
+
+
+def navigator(told: Told, localizer: object, mapper: Mapper | None = None) -> GoalNavigator:
     """Put together from the plainest parts."""
     parts = Parts(
         localizer=localizer,  # type: ignore[arg-type]
@@ -54,7 +67,7 @@ def navigator(told: Told, localizer: object) -> GoalNavigator:
         local_planner=DubinsLocalPlanner(DubinsLocalConfig(), told.robot),
         controller=PiFollower(PiFollowerConfig(), told.robot),
         reactive=None,
-        mapper=None,
+        mapper=mapper,
         escape=None,
     )
     return told.navigator(GoalNavigator, GoalNavigatorConfig(), parts)
@@ -92,6 +105,25 @@ def test_who_goes_around_nobody_says_so_among_others() -> None:
         navigator(told, Stub(told.initial))
         words = [event.text for event in told.journal.events if event.kind == "mates-unseen"]
         assert [word.split(",")[0] for word in words] == said
+
+
+@pytest.mark.parametrize("maps", [True, False])
+def test_who_maps_nothing_of_what_stands_says_so_among_others(maps: bool) -> None:
+    """A mate that stood was driven into, and no word of it; a disc stands where no map shows one."""
+    told = told_of(start=START)
+    told = replace(told, task=replace(told.task, mates=1))
+    layer = ObstacleLayer(ObstacleLayerConfig(), told.robot, told.chart)
+    stack = navigator(told, Stub(told.initial), layer if maps else MapsNothing())
+    world = World.of(ROOM_MAP, obstacle_circles_m=np.array([[START.x_m + 1.5, START.y_m, 0.3]]))
+    sim = Simulator(world, [robot(sensors(), start=START)], told.robot.dt_s)
+    for _ in range(35):
+        stack.step(sim.step([STOP])[0])
+    words = [event.text for event in told.journal.events if event.kind == "mates-unseen"]
+    if maps:
+        assert words == []
+    else:
+        assert len(words) == 1
+        assert "stack.mapper puts nothing on the map of what stands 1." in words[0]
 
 
 def test_a_robot_that_starts_lost_plans_once_it_knows_where_it_is() -> None:

@@ -26,6 +26,8 @@ WALKED_M, THROUGH_M = 0.6, 0.25
 """So far from where it was first seen, which the laser sees through by so much: it walks beyond doubt."""
 VAGUE_M = 0.3
 """Standard deviation of a track's place: what is found in the gate of a vaguer one may be another thing."""
+NEAR_M = 2.0
+"""What stands so near for a while is on the map of whoever maps."""
 STRAIGHT = 0.8
 """Share of its motion by which somebody who comes straight on is nearer."""
 
@@ -67,6 +69,12 @@ class MovingBodies:
     Idle where told to mind nobody, without exactly one lidar, without known walls (on open ground, whose
     hazards return no beam, none are needed), or while the robot is lost.
     Groups wider than ``tracks.widest_m`` without a notch between two are left to the mapper.
+
+    Attributes
+    ----------
+    shown_scans, shown_m
+        In how many scans in a row something that stands near the robot was left to the mapper, not counting
+        those in which it was kept from it; how far it was from the robot.
     """
 
     def __init__(
@@ -90,6 +98,7 @@ class MovingBodies:
         self._t_s = self.seen_s = -math.inf
         self._field = 0.0, 0.0
         self._scans = 0
+        self.shown_scans, self.shown_m = 0, math.inf
         self._loose: FloatArray = np.zeros((0, 2))
         if not self._works:
             return
@@ -122,7 +131,7 @@ class MovingBodies:
         dt_s = min(max(readings.t_s - self._t_s, 1e-3), 1.0)
         self._t_s = readings.t_s
         if not len(points) and not len(self._movers.tracks):
-            self._loose = points
+            self._loose, self.shown_scans = points, 0
             return readings
         of_track = np.full(len(points), UNUSED)
         if not self.about:
@@ -139,12 +148,25 @@ class MovingBodies:
             beside = np.hypot(points[:, 0] - pose.x_m, points[:, 1] - pose.y_m) < config.beside_m
             walked = np.append(np.isnan(self._movers.tracks[:, kernels.X0]), True)
             walks |= beside & walked[of_track]
+        self._count_shown(pose, of_track, walks)
         dropped = beams[walks]
         if not len(dropped):
             return readings
         ranges_m = scan.ranges_m.copy()
         ranges_m[dropped] = math.nan
         return replace(readings, by_sensor={**readings.by_sensor, self._lidar: LidarScan(ranges_m)})
+
+    def _count_shown(self, pose: Pose2, of_track: IntArray, walks: BoolArray) -> None:
+        """Count scans in which returns of something that stands near the robot are left to the mapper."""
+        tracks = self._movers.tracks
+        away = np.hypot(tracks[:, kernels.X] - pose.x_m, tracks[:, kernels.Y] - pose.y_m)
+        stands = ~self._walks & (tracks[:, kernels.READINGS] >= self._config.stands_readings)
+        near = stands & (away < NEAR_M)
+        if not near.any():
+            self.shown_scans = 0
+        elif (np.append(near, False)[of_track] & ~walks).any():
+            self.shown_scans += 1
+            self.shown_m = float(away[near].min())
 
     def _cut_off(self, points: FloatArray, beams: IntArray, ranges_m: FloatArray) -> BoolArray:
         """Which points belong to a thing that goes on beyond the field of view, or the reach."""

@@ -59,6 +59,8 @@ class Context:
 
     Attributes
     ----------
+    bodies
+        Who moves about, and what else no map that it was told explains.
     turn_rate_rad_s
         On the spot.
     t_s, status, reason
@@ -93,7 +95,7 @@ class Context:
         self._arrival_m = min(config.arrival_m, arrival_within_m(None, task.goal_tolerance_m))
         self.turns_on_the_spot = robot.motion.least_turning_radius_m == 0.0
         # Without a mapper it minds nothing but its map: who shows it wrong scans shows it nobody.
-        self._bodies = MovingBodies(
+        self.bodies = MovingBodies(
             config.moving_bodies,
             robot,
             own_map.told,
@@ -101,8 +103,8 @@ class Context:
             mates=task.mates,
             unexplained=unexplained_of(parts),
         )
-        self._gives_way = GiveWay(config.give_way, robot, self._bodies)
-        self.make_room = MakeRoom(config.make_room, robot, own_map.told.field, self._bodies)
+        self._gives_way = GiveWay(config.give_way, robot, self.bodies)
+        self.make_room = MakeRoom(config.make_room, robot, own_map.told.field, self.bodies)
         self._waits_s: float | None = None
         self._planned_s = 0.0
         self._waited_at, self._waited = (math.inf, math.inf), 0
@@ -143,13 +145,13 @@ class Context:
 
     def map_what_is_new(self, readings: Readings, belief: Belief) -> None:
         """Put on the own map what the told one does not explain, and does not walk about."""
-        readings = self._bodies.step(readings, belief)
+        readings = self.bodies.step(readings, belief)
         if self._mapper is not None:
             self._mapper.step(readings, belief)
 
     def react(self, readings: Readings, pose: Pose2) -> ReactionKind:
         """Let the reactive part say what is near; it does not know a wall from somebody who walks."""
-        near = self._bodies.about and self._bodies.nearest_m(pose.x_m, pose.y_m) <= SOMEBODY_M
+        near = self.bodies.about and self.bodies.nearest_m(pose.x_m, pose.y_m) <= SOMEBODY_M
         if self.reactive is not None and not near:
             self.reaction = self.reactive.step(
                 readings, pose, self.own_map.walls, self.plan.circles_m, self._goes_straight()
@@ -162,7 +164,7 @@ class Context:
 
     def plan_around_people(self, pose: Pose2) -> PlanResult:
         """The same with those who walk about where they are now."""
-        circles = np.concatenate([self.own_map.found_circles_m, self._bodies.discs_m()])
+        circles = np.concatenate([self.own_map.found_circles_m, self.bodies.discs_m()])
         return self.plan.make(self.t_s, pose, self.goals[0], circles, self.clearances_m(pose))
 
     def waits(self, command: Twist, pose: Pose2) -> bool:
@@ -179,16 +181,16 @@ class Context:
     @property
     def among_people(self) -> bool:
         """Whether somebody walked about a moment ago: what blocks the path may be gone soon."""
-        return self._bodies.about
+        return self.bodies.about
 
     @property
     def may_back(self) -> bool:
         """Whether nobody can be behind it whom its laser does not see."""
-        return not self._bodies.may_be_at(math.pi)
+        return not self.bodies.may_be_at(math.pi)
 
     def meets_something_new(self, pose: Pose2) -> bool:
         """Whether something came into sight just now, near enough, that may be the first person it meets."""
-        return self._bodies.is_new(pose.x_m, pose.y_m, SOMEBODY_M)
+        return self.bodies.is_new(pose.x_m, pose.y_m, SOMEBODY_M)
 
     def helps_to_make_room(self, pose: Pose2) -> bool:
         """Whether a place aside is any better than to stand here."""

@@ -15,6 +15,7 @@ from pilotage.stack.navigator.global_plan import GlobalPlan
 from pilotage.stack.navigator.goal.context import Context
 from pilotage.stack.navigator.goal.ended import Ended
 from pilotage.stack.navigator.goal.finding import Lost, first_state, lose
+from pilotage.stack.navigator.goal.mates_unseen import MatesUnseen
 from pilotage.stack.navigator.goal.state import State
 from pilotage.stack.navigator.goal_config import GoalNavigatorConfig
 from pilotage.stack.navigator.navigator import Parts, check_for_centre, localizer_of
@@ -83,11 +84,7 @@ class GoalNavigator:
             config, robot, task, parts, own_map, plan, parts.local_planner, parts.controller, journal
         )
         self._state: State = first_state(self._context, self.belief)
-        if task.mates and parts.mapper is None:
-            others = "another robot drives" if task.mates == 1 else f"{task.mates} others drive"
-            journal.say(
-                0.0, "mates-unseen", f"{others} about, and without stack.mapper it goes around nobody"
-            )
+        self._unseen = MatesUnseen(task.mates, parts.mapper, self._context.bodies, journal)
 
     @property
     def belief(self) -> Belief:
@@ -106,6 +103,7 @@ class GoalNavigator:
         if belief.status is BeliefStatus.LOST and not isinstance(state, (Lost, Ended)):
             state = lose(self._context, state)
         self._state, command = state.step(readings, belief)
+        self._unseen.look(readings.t_s)
         self._tell()
         return command
 
