@@ -225,6 +225,11 @@ def test_what_is_right_comes_through(role: str, gives: object) -> None:
         ("sensor", GpsFix(NAN, 0.0), "GpsFix with x_m nan"),
         ("sensor", LidarScan([1.0]), "LidarScan with ranges_m list [1.0]"),  # type: ignore[arg-type]
         ("sensor", OwnReading(NAN), "OwnReading with depth_m nan"),
+        (
+            "sensor",
+            OwnReading(math.inf),
+            "(the reach where nothing is hit), or None, found OwnReading with depth_m inf",
+        ),
         ("planner", found(replace(AROUND, length_m=-1.0)), "found length_m -1.0"),
         ("planner", found(replace(AROUND, length_m=10**400)), "Path with length_m int 1000"),
         ("planner", found(replace(AROUND, length_m=1e300)), "Path with length_m 1e+300"),

@@ -70,12 +70,17 @@ class ReadTogether(Protocol):
 
 
 def _unfit(given: object, *_: object) -> str:
-    """Readings of a type of their own are welcome, if they are numbers."""
+    """Readings of a type of their own are welcome, if they are numbers.
+
+    No inf: records and pages hold none, and who averages ranges goes through a run unseen.
+    """
     return "" if given is None else misfit(given, type(given))
 
 
 SIMULATED_SENSORS: ByConfig[SimulatedSensor | ReadTogether] = ByConfig(
-    "sensor", "pilotage.sim.sensing", Gives("read", "a reading of finite numbers, or None", _unfit)
+    "sensor",
+    "pilotage.sim.sensing",
+    Gives("read", "a reading of finite numbers (the reach where nothing is hit), or None", _unfit),
 )
 """Sensor configs to what they would read."""
 

@@ -198,7 +198,10 @@ class World:
         return mounted.fans(places, own, np.zeros(3), fan, self.fixed, self.traffic.others)
 
     def beam(self, poses: FloatArray, max_range_m: float, own: IntArray = NOBODY) -> FloatArray:
-        """Ranges (N,) of single beams along the headings of poses (N, 3); inf where nothing is hit."""
+        """Ranges (N,) of single beams along the headings of poses (N, 3); inf where nothing is hit.
+
+        Readings are finite: a sensor takes the least of it and its reach.
+        """
         places = np.ascontiguousarray(poses, dtype=np.float64).reshape(-1, 3)
         return np.array(
             [
