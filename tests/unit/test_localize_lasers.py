@@ -39,6 +39,7 @@ def test_a_laser_among_cylinders(tmp_path: Path, max_range_m: float | None) -> N
     found, _ = localized(tmp_path, QUIET, 0, max_range_m)
     assert number(found, "position_rmse_m") < 0.1
     assert 1.5 < number(found, "nees_mean") < 5.0
+    assert number(found, "silently_wrong_s") < 5.0
 
 
 @pytest.mark.parametrize("seed", SEEDS)

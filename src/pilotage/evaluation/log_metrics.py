@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from pilotage.core.types import FloatArray
-from pilotage.evaluation.consistency import nees, nees_metrics, nis_metrics
+from pilotage.core.types import BoolArray, FloatArray
+from pilotage.evaluation.consistency import longest_outside_s, nees, nees_metrics, nis_metrics
 from pilotage.evaluation.driving import covariances, poses
 from pilotage.evaluation.pose_errors import pose_errors
 
@@ -15,9 +15,12 @@ LOST_M = 2.0
 """A robot that ends farther than this from where it believes to be is lost."""
 
 
-def log_metrics(trace: Mapping[str, FloatArray]) -> tuple[dict[str, object], FloatArray]:
+def log_metrics(
+    trace: Mapping[str, FloatArray], localized: BoolArray
+) -> tuple[dict[str, object], FloatArray]:
     """Metrics of a trace at the scored steps, and its (N,) NEES, nan where the truth is not known.
 
+    ``localized`` (N,): whether the localizer held itself for localized.
     A step whose truth is nan (a gap) is left out and counted in ``steps_without_truth``.
     """
     truth, estimate = poses(trace, "true"), poses(trace, "est")
@@ -31,6 +34,8 @@ def log_metrics(trace: Mapping[str, FloatArray]) -> tuple[dict[str, object], Flo
         values[known] = nees(truth[known], estimate[known], covariances(trace)[known])
         errors = pose_errors(truth[known], estimate[known])
         metrics |= errors.metrics() | nees_metrics(values)
+        ellipses = truth[known], estimate[known], covariances(trace)[known]
+        metrics["silently_wrong_s"] = longest_outside_s(trace["t_s"][known], *ellipses, localized[known])
         metrics["lost"] = bool(errors.distance_m[-1] > LOST_M)
     return metrics | _gate(trace), values
 

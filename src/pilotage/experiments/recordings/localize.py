@@ -74,7 +74,7 @@ def localize_log(
     followed = follow(drive, *build_localizer(drive, localizer, config))
     trace, loop_s = followed.trace, followed.took_s
     steps = drive.t_s.shape[0] - 1
-    scores, trace["nees"] = log_metrics(trace)
+    scores, trace["nees"] = log_metrics(trace, followed.localized)
     metrics: dict[str, object] = {
         "mission": f"localize-{drive.name}-{localizer}",
         **_verdict(scores, followed.localized),

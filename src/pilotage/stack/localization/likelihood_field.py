@@ -16,7 +16,7 @@ from pilotage.maps.occupancy_grid import FREE, UNKNOWN, OccupancyGrid
 from pilotage.maps.outlines import rim_lines
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.maps.world_map import WorldMap
-from pilotage.stack.localization.odometry_watch import STANDS_M, TURN_AS_PATH_M
+from pilotage.stack.localization.odometry_watch import TURN_AS_PATH_M
 
 WALL_STD_M, GRID_SHARE = 0.01, 1.0 / 3.0
 """What walls are wrong by, and of cells which share of their side, beyond the cell itself."""
@@ -48,6 +48,8 @@ class LikelihoodField:
 
     Attributes
     ----------
+    on_cells
+        Whether it is one of a grid's cells.
     independent_share
         Power of a scan's likelihood that is as informative as its beams are together.
     least_at_wall, least_beside
@@ -63,10 +65,9 @@ class LikelihoodField:
         field_std_m: float | None,
         random_share: float,
         reach_m: float,
-        joint: bool = False,
     ) -> None:
         on_cells = chart.geometry is None and chart.grid is not None and not chart.open_ground
-        self._on_cells, self._joint = on_cells, joint
+        self.on_cells = on_cells
         self.independent_share = INDEPENDENT_SHARE if on_cells else 1.0
         half_m, least_std_m, walls = 0.0, WALL_STD_M, chart.reflectors
         if on_cells and chart.grid is not None:
@@ -120,16 +121,15 @@ class LikelihoodField:
     def kept(self, moved_m: float, turned_rad: float) -> float:
         """Share of what a filter knows that stays beside a scan taken after a move; 0: the two simply add up.
 
-        A grid's errors are the same from scan to scan while the same cells are in sight; those of several
-        lasers' joint scan, whose beams lie between theirs, while the robot stands. Such scans are no
+        A grid's errors are the same from scan to scan while the same cells are in sight: such scans are no
         independent witnesses. What is known already and what the scan says are joined as if nobody knew how
         much of both is the same: ``known^kept scan^(1 - kept)`` (covariance intersection: Julier and
         Uhlmann 1997; for densities Hurley 2002). No number of scans from one place then tells more than one
         of them.
         """
-        path_m = moved_m + TURN_AS_PATH_M * turned_rad
-        if not self._on_cells and not (self._joint and path_m < STANDS_M):
+        if not self.on_cells:
             return 0.0
+        path_m = moved_m + TURN_AS_PATH_M * turned_rad
         return math.exp(-max(path_m, LEAST_MOVE_M) / ALIKE_M)
 
     def mapped(self, points: FloatArray, pose: FloatArray) -> FloatArray:

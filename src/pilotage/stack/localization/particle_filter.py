@@ -17,7 +17,6 @@ from pilotage.core.types import FloatArray, Pose2
 from pilotage.kernels.filters import particles
 from pilotage.maps.world_map import WorldMap
 from pilotage.models.odometry import OdometryModel
-from pilotage.sensors.joint_lidar import JointLidarConfig
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, OdometryIncrement, Readings
 from pilotage.sensors.sensor import NonNegative, Positive
@@ -32,6 +31,8 @@ from pilotage.stack.localization.odometry_prediction import OdometryBelief, Odom
 from pilotage.stack.localization.odometry_watch import (
     LINEAR_RAD,
     MOST_HEADING_VAR,
+    STANDS_M,
+    TURN_AS_PATH_M,
     OdometryWatch,
 )
 from pilotage.stack.localization.relocalization import STDS, Relocalization
@@ -47,6 +48,9 @@ MOST_BESIDE = 0.25
 """A belief of which a larger share of beams end beside one is wrong."""
 LEAST_AT_WALL, UNEXPLAINED_SCANS = 0.15, 10
 """A crowd may hide the walls for a while; more scans that show fewer of them speak against the belief."""
+MOST_ALIKE = 5
+"""So many scans on walls count where the robot stands: what is on no map, and what the map is wrong by, is
+the same in all of them."""
 UNSURE_M = 0.1
 """A cloud wider than this (standard deviation) may settle at another place that looks alike."""
 FLOOR = np.diag([1e-12, 1e-12, 1e-12])
@@ -109,7 +113,8 @@ class ParticleFilterLocalizer:
 
     The field knows no direction: a wall seen aslant is taken to be as uncertain across as along the beam,
     so the filter believes a little less than it could. Scans on cells err alike (``LikelihoodField.kept``):
-    the cloud is never much narrower than one scan alone would make it.
+    the cloud is never much narrower than one scan alone would make it. On walls a robot that stands takes in
+    a few scans, and judges itself by the others.
 
     After a wrong start, or carried away, it notices and searches the whole map (``Relocalization``); it finds
     no place while several look alike. Fails where the belief is no single hump: the spreading keeps mean and
@@ -141,7 +146,7 @@ class ParticleFilterLocalizer:
         self._watch, self._check = OdometryWatch(robot, odometry), SelfCheck(refused_share=MOST_BESIDE)
         self._blind = bool(initial.cov[2, 2] > LINEAR_RAD**2)
         self._unexplained, self._found = 0, True
-        self._moved = (0.0, 0.0)
+        self._moved, self._alike = (0.0, 0.0), 0
         self._explained, self._sharp = ExplainedShare(), ExplainedShare()
         range_var_m2 = lidar.range_var_m2 if config.range_var_m2 is None else config.range_var_m2
         self._field = LikelihoodField(
@@ -153,7 +158,6 @@ class ParticleFilterLocalizer:
             else math.sqrt(config.measurement_var_scale) * config.field_std_m,
             random_share=config.random_share,
             reach_m=lidar.max_range_m,
-            joint=isinstance(lidar, JointLidarConfig),
         )
         self._relocalization = Relocalization(self._field, chart.bounds_m) if config.relocalize else None
         self._picked = np.unique(np.linspace(0, lidar.beams - 1, min(config.beams, lidar.beams)).astype(int))
@@ -186,9 +190,10 @@ class ParticleFilterLocalizer:
             seen = self._points_of(scan.ranges_m)
             prior = self._unweighted()
             points = self._field.mapped(seen, prior[0])
-            moments = None if self._blind else self._weigh(points, prior[1])
-            if moments is not None:
-                self._judge(prior, moments[0], points, t_s)
+            if len(points) and not self._blind:
+                weighs = not self._tells_nothing_new()
+                moments = self._weigh(points, prior[1]) if weighs else None
+                self._judge(prior, prior[0] if moments is None else moments[0], points, t_s)
         if moments is None:
             self._rounds, self._effective = 0, float(self._poses.shape[0])
             moments = self._unweighted()
@@ -212,7 +217,7 @@ class ParticleFilterLocalizer:
         """A new cloud around a place (3,) of the map."""
         initial = Belief(Pose2.from_array(place), np.diag(STDS**2))
         self._poses = _draw(initial, self._config.most_particles, self._rng)
-        self._wanted, self._blind = self._config.most_particles, False
+        self._wanted, self._blind, self._alike = self._config.most_particles, False, 0
         return self._unweighted()
 
     def _move(self, odometry: OdometryIncrement) -> None:
@@ -244,17 +249,23 @@ class ParticleFilterLocalizer:
     def _spread(self, place_m2: float, heading_rad2: float) -> None:
         """Move the particles apart by what the odometry has not told."""
         if place_m2 > 0.0 or heading_rad2 > 0.0:
+            self._alike = 0
             if self._relocalization is not None:
                 self._relocalization.forget()
             stds = np.sqrt([place_m2, place_m2, min(heading_rad2, MOST_HEADING_VAR)])
             self._poses += stds * self._rng.standard_normal(self._poses.shape)
             self._poses[:, 2] = wrap_array_to_pi(self._poses[:, 2])
 
-    def _weigh(self, points: FloatArray, prior_cov: FloatArray) -> tuple[FloatArray, FloatArray] | None:
+    def _tells_nothing_new(self) -> bool:
+        """Whether on walls a scan is one too many from where the robot stands."""
+        moved_m, turned_rad = self._moved
+        stands = moved_m + TURN_AS_PATH_M * turned_rad < STANDS_M
+        self._alike = self._alike + 1 if stands else 0
+        return not self._field.on_cells and self._alike > MOST_ALIKE
+
+    def _weigh(self, points: FloatArray, prior_cov: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Weigh and resample the cloud by a scan's end points (K, 2) in the robot's frame; returns the
-        weighted mean and covariance, None for an empty scan."""
-        if not len(points):
-            return None
+        weighted mean and covariance."""
         kept, self._rounds = self._field.kept(*self._moved), 0
         self._moved = (0.0, 0.0)
         growth, whole = 1.0 / kept if kept > 0.0 else 1.0, self._field.independent_share
