@@ -107,12 +107,18 @@ def test_a_team_has_its_worst_robots_number_and_each_robot_its_own(monkeypatch: 
         (lambda m: m.add(Metric("duration_s", "x", "s", "")), "declared already"),
         (lambda m: m.judge_task("guard", ["duration"]), "did you mean 'duration_s'"),
         (lambda _: Metric("Nice Metric", "x", "", ""), "a key of a-z"),
-        (lambda _: Metric("depth", "x", "fathom", ""), "expected a unit among"),
+        (lambda _: Metric("jerk", "x", "m/s^2", ""), "unknown unit 'm/s\\^2'; did you mean 'm/s²'"),
+        (lambda _: Metric("depth", "x", "six feet", ""), "at most 12 letters and signs without spaces"),
     ],
 )
 def test_what_cannot_be_declared_is_said(change: object, message: str) -> None:
     with pytest.raises(InputError, match=message):
         change(fresh())  # type: ignore[operator]
+
+
+def test_a_unit_of_ones_own_stands_behind_the_number() -> None:
+    """Energy, say: it was refused."""
+    assert measured(1.5, Metric("energy", "energy", "Wh", "").unit) == "1.50 Wh"
 
 
 def test_an_unknown_task_is_judged_by_what_has_a_direction() -> None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from pilotage.core.errors import InputError
+from pilotage.core.misfit import told
 from pilotage.core.types import FloatArray
 
 
@@ -46,6 +47,8 @@ UNITS = frozenset(
         *("m", "m²", "m/s", "m/s²", "s", "rad", "rad²", "rad/s", "rad/s²", "°", "Hz"),
     }
 )
+LONGEST_UNIT = 12
+_POWERS = str.maketrans("23", "²³")
 _ENDINGS = {
     "m_s2": "m/s²",
     "rad_s2": "rad/s²",
@@ -72,7 +75,8 @@ class Metric:
     name, meaning
         What it is called, and what it means in plain words.
     unit
-        One of ``UNITS``; ``share`` is a share of one, ``ratio`` a quotient worth three decimals.
+        One of ``UNITS``, told in the size that fits, or any other short text;
+        ``share`` is a share of one, ``ratio`` a quotient worth three decimals.
     whole_runs
         It compares only among runs that came to their end: one that fails early is not fast.
     tasks
@@ -106,8 +110,20 @@ class Metric:
         if not re.fullmatch(r"[a-z][a-z0-9_]*", self.key):
             raise InputError(f"metric '{self.key}': expected a key of a-z, 0-9 and _")
         if self.unit not in UNITS:
-            known = ", ".join(sorted(unit for unit in UNITS if unit))
-            raise InputError(f"metric '{self.key}': expected a unit among {known}, found '{self.unit}'")
+            self._require_a_short_text()
+
+    def _require_a_short_text(self) -> None:
+        """A unit that is none of ours stands behind the number; ours in another spelling does not."""
+        unit: object = self.unit
+        short = isinstance(unit, str) and len(unit) <= LONGEST_UNIT and unit.isprintable() and " " not in unit
+        if not short:
+            raise InputError(
+                f"metric '{self.key}': expected a unit, at most {LONGEST_UNIT} letters and signs without "
+                f"spaces, found {told(unit)}"
+            )
+        ours = self.unit.replace("^", "").replace("**", "").translate(_POWERS)
+        if ours in UNITS:
+            raise InputError(f"metric '{self.key}': unknown unit '{self.unit}'; did you mean '{ours}'?")
 
     @property
     def less_is_better(self) -> bool | None:
