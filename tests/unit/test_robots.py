@@ -64,6 +64,11 @@ class TestNames:
             "omnidirectional",
             {"max_speed_m_s": 0.4},
         )
+        short = ["team.strategy=dtap", "team.strategy.hop_s=3", "team.radio=radio", "team.radio.loss=0.5"]
+        team = load_mission("museum-patrol", short).team
+        assert team.strategy is not None
+        assert team.radio is not None
+        assert (team.strategy.parameters, team.radio.parameters) == ({"hop_s": 3}, {"loss": 0.5})
 
     def test_a_stack_of_its_own_is_laid_over_the_common_one(self) -> None:
         own = {**RIGHT, "stack": {"navigator": {"speed_m_s": 0.1}}}

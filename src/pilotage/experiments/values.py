@@ -60,9 +60,9 @@ def _is_component(place: Sequence[str]) -> bool:
         keys = ["robot", *keys[2:]]
     if keys[:2] == ["robot", "stack"]:
         keys = keys[1:]
-    if keys in (["task"], ["robot", "motion"]):
+    if keys in (["task"], ["robot", "motion"], ["team", "strategy"], ["team", "radio"]):
         return True
-    return keys[:-1] in (["stack"], ["robot", "sensors"])
+    return keys[:-1] in (["stack"], ["robot", "sensors"], ["robot", "faults"], ["world", "people"])
 
 
 def _renames(old: dict[str, Any], new: dict[str, Any]) -> bool:
