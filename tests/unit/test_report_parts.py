@@ -34,8 +34,8 @@ from support.fabricated_run import fabricate_metrics, fabricate_run, fabricate_w
 from support.pages import page_of
 
 
-def _printed(metrics: dict[str, Any]) -> str:
-    console = Console(width=100, record=True, file=io.StringIO())
+def _printed(metrics: dict[str, Any], width: int = 100) -> str:
+    console = Console(width=width, record=True, file=io.StringIO())
     console.print(summary_table(metrics))
     return console.export_text()
 
@@ -48,6 +48,7 @@ def test_summary_table() -> None:
     assert "failed: stuck [bold]here[/bold]" in failed
     assert "nan" not in failed
     assert "outcome not said" in _printed({})
+    assert "…" not in _printed(fabricate_metrics(600), width=70), "a number that is cut is another one"
 
 
 def test_a_guard_alone_tells_of_the_intruder_as_a_team_does() -> None:

@@ -24,7 +24,7 @@ def summary_table(metrics: Mapping[str, object]) -> Table:
         box=box.SIMPLE_HEAD, show_header=False, title=_title(metrics), title_justify="left", pad_edge=False
     )
     table.add_column("group", style="dim", no_wrap=True)
-    table.add_column("metric", no_wrap=True)
+    table.add_column("metric")  # a name may run over lines; a number that is cut is another one
     table.add_column("value", justify="right", no_wrap=True)
     table.add_column("band", style="dim", no_wrap=True)
     for title, rows in metric_rows(metrics):
