@@ -16,7 +16,8 @@ from pilotage.bridges.ros.bag_files import write_mcap, write_ros1, write_ros2
 from pilotage.bridges.ros.run_messages import RunMessages, Stamped
 from pilotage.cli.app import dispatch
 from pilotage.core.errors import InputError
-from pilotage.core.types import Pose2
+from pilotage.core.types import FloatArray, Pose2
+from pilotage.experiments.recordings.bag_drive import _part_var
 from pilotage.experiments.recordings.run_scans import read_run_scans
 from pilotage.logs.bag_kinds import LANDMARKS, POSES
 from pilotage.logs.bag_series import read_series
@@ -125,6 +126,25 @@ def test_odometry_is_calibrated_as_from_the_run_itself(
         found = pl.calibrate("odometry", place, truth=truth, out=tmp_path)
         for key in ("distance_scale", "angle_scale"):
             assert found[key]["value"] == pytest.approx(whole[key]["value"], rel=1e-3)
+
+
+def test_which_part_of_a_slow_increment_is_whose_is_unsure_where_the_robot_turns() -> None:
+    """Turns in between were claimed to be even: with odometry at 1 Hz a robot that swung was lost."""
+    clock, slow_s = np.arange(0.0, 10.05, 0.1), np.arange(0.0, 10.5, 0.5)
+
+    def turned_rad(t_s: FloatArray) -> FloatArray:
+        return np.where(t_s > 4.0, 1.0 - np.cos(2.0 * (t_s - 4.0)), 0.0)
+
+    def driven(t_s: FloatArray) -> FloatArray:
+        return np.column_stack([0.0 * t_s, 0.0 * t_s, turned_rad(t_s)])
+
+    var = _part_var(slow_s, driven(slow_s), clock)
+    assert (var[clock < 3.0] == 0.0).all(), "standing, and even motion, is known in all its parts"
+    off_rad = turned_rad(clock) - np.interp(clock, slow_s, turned_rad(slow_s))
+    turning = clock > 4.5
+    told_rad = float(np.sqrt(var[turning, 2].mean()))
+    assert np.diff(off_rad)[turning[1:]].std() < told_rad < 3.0 * np.abs(off_rad).max()
+    assert (_part_var(clock, driven(clock), slow_s) == 0.0).all(), "faster than the steps"
 
 
 def test_odometry_that_was_recorded_as_transforms(table: Path, tmp_path: Path) -> None:

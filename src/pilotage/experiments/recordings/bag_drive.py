@@ -49,6 +49,9 @@ from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 
 LARGEST_STEP_S, FILL_S, MOST_FILLED_S = 0.2, 0.1, 100_000.0
 """Between readings farther apart than the first the odometry moves the robot in steps of the second."""
+PART_SHARE = 0.25
+"""Density of the doubt which part of a slow increment is whose, in squares of what the rate changes by from
+one to the next, times their length: twice what a rate that changes evenly is off by in the middle."""
 BASES = ("base_link", "base_footprint")
 WHEEL_NOISE = WheelOdometryConfig(
     distance_var_m2_per_m=2e-3, angle_var_rad2_per_rad=0.01, angle_var_rad2_per_m=5e-3
@@ -200,6 +203,7 @@ def bag_drive(
         gaps,
         (),
         sideways_m=moves[:, 1],
+        part_var=_part_var(odometry_t_s, odometry, clock),
         scans=scans,
         scan_at=scan_at,
         chart=chart,
@@ -285,6 +289,27 @@ def _moves(poses: FloatArray) -> FloatArray:
     along = (c * step[:, 0] + s * step[:, 1]) / stretch
     aside = (c * step[:, 1] - s * step[:, 0]) / stretch
     return np.concatenate([np.zeros((1, 3)), np.column_stack([along, aside, turn])])
+
+
+def _part_var(t_s: FloatArray, poses: FloatArray, clock: FloatArray) -> FloatArray:
+    """(K, 3) variances of which part of an increment of slow odometry the steps are: ahead, aside, turn.
+
+    Between two poses (M, 3) of the odometry the way is taken to be even. It is not where the robot sets out,
+    brakes or turns; by how much its rates change to the next increments tells, as a Brownian bridge
+    q t (1 - t / T) of a step of length t.
+    """
+    out = np.zeros((len(clock), 3))
+    periods_s = np.maximum(np.diff(t_s), 1e-3)
+    changes = np.diff(_moves(poses)[1:] / periods_s[:, None], axis=0) ** 2
+    if not len(changes):
+        return out
+    most = np.maximum(np.concatenate([changes[:1], changes]), np.concatenate([changes, changes[-1:]]))
+    steps_s = np.diff(clock)
+    within = np.searchsorted(t_s, clock[:-1] + 0.5 * steps_s, side="right") - 1
+    within = np.clip(within, 0, len(periods_s) - 1)
+    share = np.maximum(1.0 - steps_s / periods_s[within], 0.0)
+    out[1:] = PART_SHARE * most[within] * (periods_s[within] * steps_s * share)[:, None]
+    return out
 
 
 def _sheet(laser: LaserLog) -> LidarConfig:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -60,6 +60,8 @@ class RecordedDrive:
         Variances per second of the odometry's distance (m^2) and angle (rad^2), where the log gives them.
     sideways_m
         (K,) as ``distance_m``, to the left; None where the base cannot.
+    part_var
+        (K, 3) as ``OdometryIncrement`` has it, of odometry slower than the steps; None: it is as fast.
     scans, scan_at
         (S, B) ranges, and (K,) which of them came at a step (-1: none); None without a laser.
     turning
@@ -95,6 +97,7 @@ class RecordedDrive:
     rate_var: tuple[float, float] | None = None
     stale: tuple[str, ...] = ()
     sideways_m: FloatArray | None = None
+    part_var: FloatArray | None = None
     scans: FloatArray | None = None
     scan_at: IntArray | None = None
     turning: tuple[str, FloatArray] | None = None
@@ -107,7 +110,11 @@ class RecordedDrive:
         said: dict[str, Reading] = {}
         if np.isfinite(self.distance_m[k]):
             aside_m = 0.0 if self.sideways_m is None else float(self.sideways_m[k])
-            said[ODOMETRY] = OdometryIncrement(float(self.distance_m[k]), float(self.angle_rad[k]), aside_m)
+            increment = OdometryIncrement(float(self.distance_m[k]), float(self.angle_rad[k]), aside_m)
+            if self.part_var is not None:
+                ahead, left, turn = self.part_var[k].tolist()
+                increment = replace(increment, part_var=(ahead, left, turn))
+            said[ODOMETRY] = increment
         rows = slice(int(self.first[k]), int(self.first[k + 1]))
         if rows.stop > rows.start:
             said[BEACONS] = BeaconReadings(self.ids[rows], self.ranges_m[rows], self.bearings_rad[rows])
