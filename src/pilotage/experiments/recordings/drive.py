@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -105,9 +106,10 @@ class RecordedDrive:
     def readings_at(self, k: int) -> Readings:
         """What was sensed at step ``k``, as the robot's plug takes it."""
         said: dict[str, Reading] = {}
-        if np.isfinite(self.distance_m[k]):
+        distance_m = float(self.distance_m[k])
+        if math.isfinite(distance_m):
             aside_m = 0.0 if self.sideways_m is None else float(self.sideways_m[k])
-            said[ODOMETRY] = OdometryIncrement(float(self.distance_m[k]), float(self.angle_rad[k]), aside_m)
+            said[ODOMETRY] = OdometryIncrement(distance_m, float(self.angle_rad[k]), aside_m)
         rows = slice(int(self.first[k]), int(self.first[k + 1]))
         if rows.stop > rows.start:
             said[BEACONS] = BeaconReadings(self.ids[rows], self.ranges_m[rows], self.bearings_rad[rows])
