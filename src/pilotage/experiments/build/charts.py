@@ -15,7 +15,7 @@ from pilotage.core.config import Config, validate
 from pilotage.core.errors import InputError, unknown_name
 from pilotage.core.neighbours import hint_beside
 from pilotage.core.types import Pose2
-from pilotage.experiments.values import parse_yaml, read_text
+from pilotage.experiments.values import parse_shipped, parse_yaml, read_text
 from pilotage.maps.crater_cache import cached_crater_terrain
 from pilotage.maps.edge import closed
 from pilotage.maps.elevation_file import HEIGHTS_ALONE, read_elevation
@@ -137,7 +137,7 @@ def _named(source: str, markings: MarkingsConfig) -> WorldMap:
     if not suffix and "/" not in source:
         if source not in shipped_maps():
             raise unknown_name("map", source, shipped_maps())
-        return _of_values(parse_yaml((SHIPPED / f"{source}.yaml").read_text(), source), source, markings)
+        return _of_values(parse_shipped((SHIPPED / f"{source}.yaml").read_text(), source), source, markings)
     if not path.is_file():
         beside = hint_beside(path, {".yaml", ".yml", *GRID_SUFFIXES, *HEIGHTS_ALONE})
         raise InputError(f"map '{source}': expected a map file, found none there{beside}")
