@@ -19,9 +19,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 from pilotage.core import plugins
 from pilotage.experiments.roles import ROLES
+from pilotage.sim.bodies.motion import SIMULATED_MOTIONS
+from pilotage.sim.sensing.sensor import SIMULATED_SENSORS
 from support.warm_workers import WarmProcess, warm_context
 
 
@@ -61,10 +64,15 @@ class Started:
         return subprocess.CompletedProcess((), self.process.exitcode, *told)
 
 
-def pilotage(*words: str, folder: Path, site: Path | None = None) -> subprocess.CompletedProcess[str]:
-    """Run ``pilotage WORDS`` in ``folder`` without this process's plugins; ``site`` is first on its path."""
+def pilotage(
+    *words: str, folder: Path, site: Path | None = None, rooms: Path | None = None
+) -> subprocess.CompletedProcess[str]:
+    """Run ``pilotage WORDS`` in ``folder`` without this process's plugins.
+
+    ``site`` is first on its path; what stands in ``rooms`` is as if it stood in pilotage's.
+    """
     with tempfile.TemporaryDirectory(prefix="pilotage-command-") as place:
-        return start(Path(place), _command, words, site, folder=folder).ended()
+        return start(Path(place), _command, words, site, rooms, folder=folder).ended()
 
 
 def start(place: Path, act: Callable[..., int], *given: object, folder: Path) -> Started:
@@ -93,13 +101,18 @@ def _alone(
     sys.exit(act(*given))
 
 
-def _command(words: tuple[str, ...], site: Path | None) -> int:
+def _command(words: tuple[str, ...], site: Path | None, rooms: Path | None) -> int:
     os.environ.pop(plugins.VARIABLE, None)
     sys.path.insert(0, "" if site is None else str(site))
     importlib.invalidate_caches()
+    if rooms is not None:
+        for room in {path.parent for path in rooms.rglob("*.py")}:
+            package = ".".join(["pilotage", *room.relative_to(rooms).parts])
+            importlib.import_module(package).__path__.append(str(room))
     # It has not looked for installed packages yet.
     plugins._seen_entry_points = False
-    for registry in ROLES.values():
+    registries: list[Any] = [*ROLES.values(), SIMULATED_SENSORS, SIMULATED_MOTIONS]
+    for registry in registries:
         registry._loaded = False
     from pilotage.cli.main import main
 

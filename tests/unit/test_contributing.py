@@ -5,10 +5,8 @@ from __future__ import annotations
 import importlib
 import inspect
 import json
-import os
 import re
 import subprocess
-import sys
 import tomllib
 from collections import defaultdict
 from pathlib import Path
@@ -27,15 +25,6 @@ MODULES = dict(re.findall(r"^```python\n# src/pilotage/(\S+)\n(.*?)^```", TEXT, 
 (MISSION,) = re.findall(r"^```yaml\n(.*?)^```", TEXT, re.MULTILINE | re.DOTALL)
 NAMES = {"beeline", "position_fix", "tricycle", "stroll"}
 
-FROM_INSIDE = """
-import importlib, pathlib, sys
-from pilotage.cli.main import main
-for room in {path.parent for path in pathlib.Path("rooms").rglob("*.py")}:
-    package = ".".join(["pilotage", *room.relative_to("rooms").parts])
-    importlib.import_module(package).__path__.append(str(room.absolute()))
-sys.exit(main(sys.argv[1:]))
-"""
-"""The rooms with one more module each, as if it stood there."""
 RUN = "run", "a-stroll.yaml", "--json", "--out", "runs"
 
 
@@ -66,14 +55,7 @@ def test_the_examples_run_from_inside(tmp_path: Path) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text)
     (tmp_path / "a-stroll.yaml").write_text(MISSION)
-    done = subprocess.run(
-        [sys.executable, "-c", FROM_INSIDE, *RUN],
-        cwd=tmp_path,
-        env={key: value for key, value in os.environ.items() if key != plugins.VARIABLE},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = pilotage(*RUN, folder=tmp_path, rooms=tmp_path / "rooms")
     assert check(done) >= 2.0
 
 

@@ -16,7 +16,8 @@ from support.films import FilmScript, render_film
 SCRIPT = """
 import pilotage as pl
 
-mission = pl.load("museum-1", seed=7, set={"stack.localizer.gate": 0.99})
+near = {"x_m": 6.0, "y_m": 6.0}
+mission = pl.load("museum-1", seed=7, set={"stack.localizer.gate": 0.99, "world.goal": near})
 run = pl.run(mission)
 print(run.success, run.reason)
 print(run.metrics["position_rmse_m"])

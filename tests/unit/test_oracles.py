@@ -178,7 +178,11 @@ class TestSheets:
 
     def test_sensors_without_faults(self, small: Path) -> None:
         """A gyroscope with a large scale error misleads the fused heading of the report's robot."""
-        bad = ("robot.sensors.gyroscope.scale_error=0.2", "robot.sensors.gyroscope.rate_std_rad_s=0.05")
+        bad = (
+            "robot.sensors.gyroscope.scale_error=0.2",
+            "robot.sensors.gyroscope.rate_std_rad_s=0.05",
+            "run.time_limit_s=60",
+        )
         drive = explored(small, "drive", *REPORTS, *bad)[1]["heading_rmse_rad"]
         both = explored(small, "drive, sensors", *REPORTS, *bad)[1]["heading_rmse_rad"]
         assert both < 0.5 * drive

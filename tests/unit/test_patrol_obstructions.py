@@ -314,6 +314,7 @@ def test_who_failed_says_and_counts_nothing_until_it_is_mended() -> None:
     """It told every few seconds that it made room, and was counted for it."""
     values = two_rooms(DOOR_Y_M)
     values["team"]["failures"] = [{"robot": 1, "at_s": 0.0}, {"robot": 2, "at_s": 10.0, "for_s": 60.0}]
+    values["task"]["duration_s"] = values["run"]["time_limit_s"] = 75.0
     experiment = build(mission_of(values, seed=2))
     run = run_loop(experiment)
     told = {n: [e for e in run.finished.events if e.text.startswith(f"robot-{n}: ")] for n in (1, 2)}

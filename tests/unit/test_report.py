@@ -25,8 +25,15 @@ from support.fabricated_run import (
 from support.pages import FIGURES, Outline, page_of
 
 
-def test_page_is_whole_and_well_formed(tmp_path: Path) -> None:
-    page = page_of(fabricate_run(tmp_path / "run"))
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """A run as it comes, and its page."""
+    run = fabricate_run(tmp_path_factory.mktemp("plain") / "run")
+    return run, page_of(run)
+
+
+def test_page_is_whole_and_well_formed(plain: tuple[Path, str]) -> None:
+    _, page = plain
     outline = Outline(page)
     assert not outline.open
     assert len(outline.ids) == len(set(outline.ids))
@@ -42,8 +49,8 @@ def test_page_is_whole_and_well_formed(tmp_path: Path) -> None:
     assert "95 % band: 2.70 to 3.20" in text
 
 
-def test_captions_speak_of_what_the_run_has(tmp_path: Path) -> None:
-    page = page_of(fabricate_run(tmp_path / "run"))
+def test_captions_speak_of_what_the_run_has(plain: tuple[Path, str], tmp_path: Path) -> None:
+    _, page = plain
     assert "NIS each innovation with its own" in page
     assert "feed-forward along the path" in page
     assert "600 steps" in page
@@ -74,8 +81,8 @@ def test_a_run_of_days_is_drawn_over_days_and_in_metres(tmp_path: Path) -> None:
     assert "σ of x and y [m]" in page
 
 
-def test_layers_of_the_map_can_be_switched(tmp_path: Path) -> None:
-    page = page_of(fabricate_run(tmp_path / "run"))
+def test_layers_of_the_map_can_be_switched(plain: tuple[Path, str]) -> None:
+    _, page = plain
     layers = re.findall(r'id="map-show-([a-z]+)"', page)
     assert {"true", "estimated", "plan", "replans", "tree", "obstacles", "mapped", "beacons"} <= set(layers)
     for layer in layers:
@@ -83,9 +90,9 @@ def test_layers_of_the_map_can_be_switched(tmp_path: Path) -> None:
         assert f"#map:has(#map-show-{layer}:not(:checked)) .layer-{layer}" in page
 
 
-def test_same_run_gives_the_same_page(tmp_path: Path) -> None:
-    run = fabricate_run(tmp_path / "run")
-    assert write_report(run).read_bytes() == write_report(run).read_bytes()
+def test_same_run_gives_the_same_page(plain: tuple[Path, str]) -> None:
+    run, page = plain
+    assert write_report(run).read_text(encoding="utf-8") == page
     assert not list(run.glob(".report*"))
 
 

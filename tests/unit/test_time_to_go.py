@@ -7,7 +7,32 @@ import math
 import numpy as np
 import pytest
 
+from pilotage.core.types import FloatArray
 from pilotage.kernels.control import eikonal
+
+
+def lowered(time: FloatArray, slowness: FloatArray, spacing: float) -> None:
+    """The same as ``sweep_down``, every node looked at in every sweep."""
+    rows, columns = time.shape
+    padded = np.pad(time, 1, constant_values=np.inf)
+    changed = np.inf
+    while changed > eikonal.NEAR_S:
+        changed = 0.0
+        for down, right in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
+            for r in range(rows)[::down]:
+                for c in range(columns)[::right]:
+                    cost = slowness[r, c] * spacing
+                    a = min(padded[r, c + 1], padded[r + 2, c + 1])
+                    b = min(padded[r + 1, c], padded[r + 1, c + 2])
+                    if not (np.isfinite(cost) and min(a, b) < np.inf):
+                        continue
+                    new = min(a, b) + cost
+                    if abs(a - b) < cost:
+                        new = 0.5 * (a + b + math.sqrt(2.0 * cost * cost - (a - b) * (a - b)))
+                    if new < padded[r + 1, c + 1] - 1e-12:
+                        changed = max(changed, padded[r + 1, c + 1] - new)
+                        padded[r + 1, c + 1] = new
+    time[:] = padded[1:-1, 1:-1]
 
 
 class TestTimeToGo:
@@ -32,6 +57,18 @@ class TestTimeToGo:
         assert time[5, 5] == pytest.approx(around, rel=0.06)
         _, dy = eikonal.descent(1.5, 1.5, time, 0.0, 0.0, 0.1)
         assert dy > 0.7
+
+    def test_nodes_left_alone_are_those_that_would_not_change(self) -> None:
+        """Lowered as long as anything changes, all of them each time: not a bit differs."""
+        rng = np.random.default_rng(3)
+        for _ in range(6):
+            slow = np.where(rng.random((9, 12)) < 0.2, np.inf, rng.uniform(0.5, 3.0, (9, 12)))
+            time = np.full(slow.shape, np.inf)
+            time[rng.integers(9, size=3), rng.integers(12, size=3)] = rng.uniform(0.0, 2.0, 3)
+            again = time.copy()
+            eikonal.sweep_down(time, slow, 0.15)
+            lowered(again, slow, 0.15)
+            assert np.array_equal(again, time)
 
     def test_a_way_ends_at_its_goal(self) -> None:
         """It went to and fro over it until all its steps were made: claims ended there, with 90 turns."""

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -52,26 +52,40 @@ def bootstrap_mean(values: FloatArray) -> tuple[float, float]:
     scale = float(np.abs(values).max())
     if np.ptp(values) <= ROUNDING * scale:
         return float(values.min()), float(values.max())
-    return _resampled((values,), scale, np.mean)
+    return _resampled((values,), scale)
 
 
-def _resampled(
-    samples: tuple[FloatArray, ...], scale: float, statistic: Callable[..., Any]
-) -> tuple[float, float]:
+def _resampled(samples: tuple[FloatArray, ...], scale: float) -> tuple[float, float]:
     """Of samples as shares of their scale: squares of very small numbers would vanish."""
+    low, high = _interval(tuple((values / scale).tobytes() for values in samples))
+    return scale * low, scale * high
+
+
+@lru_cache(maxsize=1000)
+def _interval(samples: tuple[bytes, ...]) -> tuple[float, float]:
+    """Of the mean of one sample, or of the change from one to the other's.
+
+    The page, the export and the words of a study ask for the same ones.
+    """
+    low = high = math.nan
     for method in ("BCa", "percentile"):  # BCa has no acceleration where almost all values are equal
         found = scipy.stats.bootstrap(
-            tuple(values / scale for values in samples),
-            statistic,
+            tuple(map(np.frombuffer, samples)),
+            np.mean if len(samples) == 1 else _change,
             vectorized=True,
             confidence_level=LEVEL,
             n_resamples=RESAMPLES,
             method=method,
             rng=np.random.default_rng(0),
         ).confidence_interval
-        if math.isfinite(found.low) and math.isfinite(found.high):
+        low, high = float(found.low), float(found.high)
+        if math.isfinite(low) and math.isfinite(high):
             break
-    return scale * float(found.low), scale * float(found.high)
+    return low, high
+
+
+def _change(one: FloatArray, other: FloatArray, axis: int) -> Any:
+    return np.mean(other, axis=axis) - np.mean(one, axis=axis)
 
 
 def bootstrap_difference(first: FloatArray, other: FloatArray) -> tuple[float, float]:
@@ -83,9 +97,7 @@ def bootstrap_difference(first: FloatArray, other: FloatArray) -> tuple[float, f
         change = float(other.mean() - first.mean())
         change = 0.0 if abs(change) <= ROUNDING * scale else change
         return change, change
-    return _resampled(
-        (first, other), scale, lambda one, two, axis: np.mean(two, axis=axis) - np.mean(one, axis=axis)
-    )
+    return _resampled((first, other), scale)
 
 
 def summarize(values: FloatArray) -> Summary:

@@ -15,7 +15,14 @@ from pilotage.core.neighbours import hint_beside
 from pilotage.core.plugins import add_plugins, is_package, named_plugins
 from pilotage.experiments.named_files import anchored
 from pilotage.experiments.resolve import check_components, component_places
-from pilotage.experiments.values import apply_override, apply_setting, merge, parse_yaml, read_text
+from pilotage.experiments.values import (
+    apply_override,
+    apply_setting,
+    merge,
+    parse_shipped,
+    parse_yaml,
+    read_text,
+)
 from pilotage.missions.mission import TOP_KEYS, Mission
 from pilotage.missions.old_keys import refuse_old_keys
 
@@ -124,7 +131,7 @@ def read_mission(name_or_path: str, extended_by: tuple[str, ...] = ()) -> dict[s
             raise InputError(f"mission file '{name_or_path}': expected a YAML file, found none there{beside}")
         values = _at_their_places(parse_yaml(read_text(path), str(path)), path.parent)
     elif name_or_path in shipped_missions():
-        values = parse_yaml((SHIPPED / f"{name_or_path}.yaml").read_text(), name_or_path)
+        values = parse_shipped((SHIPPED / f"{name_or_path}.yaml").read_text(), name_or_path)
     else:
         raise unknown_name("mission", name_or_path, shipped_missions())
     return extended(values, name_or_path, extended_by)

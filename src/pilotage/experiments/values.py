@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,14 @@ def parse_yaml(text: str, where: str) -> dict[str, Any]:
         found = "an empty file" if values is None else f"a {type(values).__name__}"
         raise InputError(f"{where}: expected a mapping of keys, found {found}")
     return values
+
+
+_parsed_once = lru_cache(maxsize=64)(parse_yaml)
+
+
+def parse_shipped(text: str, where: str) -> dict[str, Any]:
+    """The same of a file that comes with pilotage, parsed once a process: each trial of a study reads it."""
+    return copy.deepcopy(_parsed_once(text, where))
 
 
 def merge(base: dict[str, Any], changes: dict[str, Any], place: Sequence[str] = ()) -> dict[str, Any]:

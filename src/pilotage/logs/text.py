@@ -5,10 +5,12 @@ Every complaint names the file and the line, so that the user can look at the pl
 
 from __future__ import annotations
 
+import math
 import re
 from array import array
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +21,8 @@ from pilotage.core.types import FloatArray, IntArray
 
 SAME_FORM = 3
 """So many lines in one form tell how the next one should look."""
+AT_ONCE = 256
+"""So many lines are words before they become numbers: of all lines they would fill the memory."""
 LARGEST_TIME_S = 1e12
 """No clock counts further: thirty thousand years."""
 
@@ -80,6 +84,7 @@ def read_table(
     width = len(columns)
     numbers = array("d")
     places: list[int] = []
+    rows: list[list[str]] = []
     whole = read_text(path)
     lines = whole.splitlines()
     for number, line in enumerate(lines, start=1):
@@ -92,15 +97,18 @@ def read_table(
             width = len(words)
             continue
         if len(words) != width:
+            _numbers(path, places, rows, columns)  # what is wrong before is told first
             raise InputError(
                 f"{path} line {number}: expected {width} columns"
                 + ("" if header else f" ({' '.join(columns)})")
                 + f", found {len(words)}{_last(number, len(lines), len(words) < width)}"
             )
-        numbers.extend(
-            _numbers(path, number, words if picked is None else [words[i] for i in picked], columns)
-        )
+        rows.append(words if picked is None else [words[i] for i in picked])
         places.append(number)
+        if len(rows) == AT_ONCE:
+            numbers.extend(_numbers(path, places, rows, columns))
+            rows.clear()
+    numbers.extend(_numbers(path, places, rows, columns))
     if not places:
         raise InputError(f"{path} line {len(lines) + 1}: expected rows of numbers, found the end of the file")
     if not whole.endswith(("\n", "\r")):
@@ -135,19 +143,31 @@ def _last(number: int, total: int, short: bool) -> str:
     return "; the file seems to be cut short" if short and number == total else ""
 
 
-def _numbers(path: Path, number: int, words: Sequence[str], columns: Sequence[str]) -> list[float]:
+def _numbers(
+    path: Path, places: Sequence[int], rows: Sequence[Sequence[str]], columns: Sequence[str]
+) -> array[float]:
+    """Those of the last lines, one after the other; the first thing wrong is told."""
     try:
         # Python reads 1_000 as a number; a log that holds such a word is damaged.
-        values = [float(word.replace("_", "?")) for word in words]
+        values = array("d", [float(word.replace("_", "?")) for word in chain.from_iterable(rows)])
+        if np.isfinite(values).all():
+            return values
     except ValueError:
-        bad = next(i for i, word in enumerate(words) if not _is_number(word))
-        raise InputError(
-            f"{path} line {number}: {columns[bad]}: expected a number, found '{words[bad].strip()}'"
-        ) from None
-    for name, value in zip(columns, values, strict=True):
-        if not abs(value) < float("inf"):
-            raise InputError(f"{path} line {number}: {name}: expected a finite number, found {value}")
-    return values
+        pass
+    raise next(_complaints(path, places[len(places) - len(rows) :], rows, columns))
+
+
+def _complaints(
+    path: Path, places: Sequence[int], rows: Sequence[Sequence[str]], columns: Sequence[str]
+) -> Iterator[InputError]:
+    for number, words in zip(places, rows, strict=True):
+        named = list(zip(columns, words, strict=True))
+        for name, word in named:
+            if not _is_number(word):
+                yield InputError(f"{path} line {number}: {name}: expected a number, found '{word.strip()}'")
+        for name, word in named:
+            if not math.isfinite(value := float(word)):
+                yield InputError(f"{path} line {number}: {name}: expected a finite number, found {value}")
 
 
 def _is_number(word: str) -> bool:

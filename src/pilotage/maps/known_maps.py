@@ -19,6 +19,7 @@ MOST_ANSWERS = 16
 T = TypeVar("T")
 
 _MET: OrderedDict[bytes, WorldMap] = OrderedDict()
+_CONTENTS: WeakKeyDictionary[WorldMap, bytes] = WeakKeyDictionary()
 _MEETING = Lock()
 """Trials of a cluster and environments for learning run in threads of one process."""
 
@@ -28,7 +29,9 @@ def known_map(chart: WorldMap) -> WorldMap:
 
     A mission's warm-up and its run, and all trials of a study, read the same map anew; nobody changes one.
     """
-    key = content_of(chart)
+    key = _CONTENTS.get(chart)
+    if key is None:
+        key = _CONTENTS[chart] = content_of(chart)
     with _MEETING:
         met = _MET.setdefault(key, chart)
         _MET.move_to_end(key)

@@ -26,9 +26,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Outline
 from matplotlib.ticker import MaxNLocator
-from matplotlib.transforms import Transform
+from matplotlib.transforms import Bbox, Transform
 
 from pilotage.core.types import FloatArray
+from pilotage.report.light_axes import LightAxes
 from pilotage.report.quantities import HOURS_FROM_S
 from pilotage.report.series import decimate
 
@@ -153,7 +154,8 @@ def stacked_axes(
     top = total - _TOP_PT
     panels = []
     for index, (title, height) in enumerate(zip(titles, heights_pt, strict=True)):
-        axes = figure.add_axes((_LEFT_PT / WIDTH_PT, (top - height) / total, width, height / total))
+        box = _LEFT_PT / WIDTH_PT, (top - height) / total, width, height / total
+        axes = figure.add_axes(box, axes_class=LightAxes)
         axes.set_title(title)
         if share_time and index < len(titles) - 1:
             axes.tick_params(axis="x", labelbottom=False, length=0)
@@ -297,14 +299,25 @@ def _let_ticks_be_as_told(figure: Figure) -> None:
 
     Ticks are styled by ``tick_params`` alone, so that all of an axis look like its first one; each would be
     made of five new objects, and then told all that the first one's have. An axis without words has none
-    whose place its numbers tell.
+    whose place its numbers tell, and a tick without length none to draw.
     """
     for axes in figure.axes:
         for axis in (axes.xaxis, axes.yaxis):
+            for tick in axis.majorTicks:
+                if tick.get_tick_padding() == 0.0:  # it has no length
+                    tick.tick1line.set_visible(False)
             vars(axis)["_get_tick"] = partial(_tick_of, axis)
             vars(axis)["_copy_tick_props"] = _clip_alike
-            if not axis.get_label_text():
-                vars(axis)["_autolabelpos"] = False
+            if axis.get_label_text():
+                continue
+            vars(axis)["_autolabelpos"] = False
+            if _PLAIN[0] <= max(map(abs, axis.get_view_interval())) <= _PLAIN[1]:
+                vars(axis)["_get_ticklabel_bboxes"] = _nowhere
+
+
+def _nowhere(_ticks: object, _renderer: object) -> tuple[list[Bbox], list[Bbox]]:
+    """Where an axis's numbers stand: asked for a power of ten beside them, which there is none."""
+    return [], []
 
 
 def _tick_of(axis: Any, major: bool) -> Tick:

@@ -224,13 +224,16 @@ def _robust_line(points: Floats) -> tuple[Floats, float]:
         return np.full(3, np.nan), float("nan")
     weight = np.ones(len(points))
     line, spread = np.zeros(3), 1.0
+    low, high = (len(points) - 1) // 2, len(points) // 2
     for _ in range(12):
-        middle = np.average(points, axis=0, weights=weight)
+        # As np.average and np.median have it, without their questions to such arrays.
+        middle = (points * weight[:, None]).sum(axis=0) / weight.sum()
         away = points - middle
         _, vectors = np.linalg.eigh((away * weight[:, None]).T @ away)
         normal = vectors[:, 0]
         residual = away @ normal
-        spread = max(1.4826 * float(np.median(np.abs(residual))), 0.1)
+        size = np.partition(np.abs(residual), (low, high))
+        spread = max(1.4826 * float(0.5 * (size[low] + size[high])), 0.1)
         weight = 1.0 / (1.0 + (residual / (2.0 * spread)) ** 2) ** 2
         line = np.array([normal[0], normal[1], normal @ middle])
     return line, spread

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import lru_cache
 from importlib import resources
 from itertools import pairwise
 from pathlib import Path
@@ -21,7 +22,7 @@ from pilotage.maps.edge import closed
 from pilotage.maps.elevation_file import HEIGHTS_ALONE, read_elevation
 from pilotage.maps.grid_file import GRID_SUFFIXES, read_grid
 from pilotage.maps.grid_image import as_bytes, read_grey, read_hazard_image
-from pilotage.maps.known_maps import known_map
+from pilotage.maps.known_maps import KEPT, known_map
 from pilotage.maps.landmark_image import read_landmark_image
 from pilotage.maps.landmark_table import read_landmark_table
 from pilotage.maps.landmarks import Landmarks
@@ -137,7 +138,7 @@ def _named(source: str, markings: MarkingsConfig) -> WorldMap:
     if not suffix and "/" not in source:
         if source not in shipped_maps():
             raise unknown_name("map", source, shipped_maps())
-        return _of_values(parse_yaml((SHIPPED / f"{source}.yaml").read_text(), source), source, markings)
+        return _shipped((SHIPPED / f"{source}.yaml").read_text(), source, markings)
     if not path.is_file():
         beside = hint_beside(path, {".yaml", ".yml", *GRID_SUFFIXES, *HEIGHTS_ALONE})
         raise InputError(f"map '{source}': expected a map file, found none there{beside}")
@@ -158,6 +159,12 @@ def _named(source: str, markings: MarkingsConfig) -> WorldMap:
         f"grid ({', '.join(sorted(GRID_SUFFIXES))}) or heights ({', '.join(sorted(HEIGHTS_ALONE))}), "
         f"found '{suffix}'"
     )
+
+
+@lru_cache(maxsize=KEPT)
+def _shipped(text: str, name: str, markings: MarkingsConfig) -> WorldMap:
+    """A map that comes with pilotage, which each trial of a study asks for."""
+    return _of_values(parse_yaml(text, name), name, markings)
 
 
 def _of_values(values: dict[str, Any], where: str, markings: MarkingsConfig) -> WorldMap:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -108,9 +109,10 @@ class RecordedDrive:
     def readings_at(self, k: int) -> Readings:
         """What was sensed at step ``k``, as the robot's plug takes it."""
         said: dict[str, Reading] = {}
-        if np.isfinite(self.distance_m[k]):
+        distance_m = float(self.distance_m[k])
+        if math.isfinite(distance_m):
             aside_m = 0.0 if self.sideways_m is None else float(self.sideways_m[k])
-            increment = OdometryIncrement(float(self.distance_m[k]), float(self.angle_rad[k]), aside_m)
+            increment = OdometryIncrement(distance_m, float(self.angle_rad[k]), aside_m)
             if self.part_var is not None:
                 ahead, left, turn = self.part_var[k].tolist()
                 increment = replace(increment, part_var=(ahead, left, turn))

@@ -105,7 +105,7 @@ def follow(
     """Step a localizer through a drive."""
     names = tuple(journal.units)
     told_recoveries = names.index("recoveries") if "recoveries" in names else None
-    sums = [name in SUMS for name in names]
+    sums = [i for i, name in enumerate(names) if name in SUMS]
     rows: list[list[float]] = []
     events: list[Event] = []
     total = [math.nan] * len(names)
@@ -115,8 +115,9 @@ def follow(
     source, listener = RecordedSource(drive), _Listener(localizer)
     for (readings,), _ in stepped(source, [listener]):
         k = source.at
-        for i, value in enumerate(journal.row):
-            if not sums[i] or math.isnan(total[i]):
+        for i in sums:
+            value = journal.row[i]
+            if math.isnan(total[i]):
                 total[i] = value
             elif not math.isnan(value):
                 total[i] += value
@@ -134,10 +135,12 @@ def follow(
             upper = (cov[0, 0], cov[0, 1], cov[1, 1], cov[0, 2], cov[1, 2], cov[2, 2])
             x, y, theta = drive.truth[k]
             heading = (theta + math.pi) % (2.0 * math.pi) - math.pi
-            rows.append([readings.t_s, x, y, heading, *pose.as_array(), *upper, *total])
+            told = [*journal.row]
+            for i in sums:
+                told[i], total[i] = total[i], math.nan
+            rows.append([readings.t_s, x, y, heading, *pose.as_array(), *upper, *told])
             localized.append(listener.belief.status is BeliefStatus.LOCALIZED)
             seen.record(readings)
-            total = [math.nan] * len(names)
         if steps is not None and k >= steps:
             break
     columns = (*TRUTH_COLUMNS, *BELIEF_COLUMNS, *names)

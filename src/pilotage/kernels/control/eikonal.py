@@ -33,6 +33,8 @@ def sweep_down(time: FloatArray, slowness: FloatArray, spacing: float) -> int:
     Rounds of four sweeps taken; ``MOST_ROUNDS`` where it was not settled by then.
     """
     rows, columns = time.shape
+    # Beside whom nothing has become smaller since it was looked at stays as it is (Bak et al. 2010).
+    due = np.ones((rows, columns), np.bool_)
     for done in range(MOST_ROUNDS):
         changed = 0.0
         for direction in range(4):
@@ -40,6 +42,9 @@ def sweep_down(time: FloatArray, slowness: FloatArray, spacing: float) -> int:
                 r = i if direction < 2 else rows - 1 - i
                 for j in range(columns):
                     c = j if direction % 2 == 0 else columns - 1 - j
+                    if not due[r, c]:
+                        continue
+                    due[r, c] = False
                     cost = slowness[r, c] * spacing
                     if not cost < np.inf:
                         continue
@@ -57,6 +62,8 @@ def sweep_down(time: FloatArray, slowness: FloatArray, spacing: float) -> int:
                     if new < time[r, c] - 1e-12:
                         changed = max(changed, time[r, c] - new)
                         time[r, c] = new
+                        due[max(r - 1, 0), c] = due[min(r + 1, rows - 1), c] = True
+                        due[r, max(c - 1, 0)] = due[r, min(c + 1, columns - 1)] = True
         if not changed > NEAR_S:
             return done + 1
     return MOST_ROUNDS

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pilotage.core.types import FloatArray
+from pilotage.report.light_axes import LightAxes
 from pilotage.report.style import BLUE, SKY, VERMILLION, WIDTH_PT, note
 
 _LEFT_PT, _RIGHT_PT, _TOP_PT, _BOTTOM_PT, _GAP_PT = 50.0, 10.0, 22.0, 36.0, 52.0
@@ -27,7 +28,9 @@ def panels_in_a_row(
     panels = []
     for i, (title, label) in enumerate(zip(titles, labels, strict=True)):
         left = _LEFT_PT + i * (width + _GAP_PT)
-        axes = figure.add_axes((left / WIDTH_PT, _BOTTOM_PT / total, width / WIDTH_PT, height_pt / total))
+        axes = figure.add_axes(
+            (left / WIDTH_PT, _BOTTOM_PT / total, width / WIDTH_PT, height_pt / total), axes_class=LightAxes
+        )
         axes.set_title(title)
         axes.set_xlabel(label, labelpad=3.0)
         panels.append(axes)

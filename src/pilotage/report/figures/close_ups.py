@@ -19,6 +19,7 @@ from pilotage.report import quantities
 from pilotage.report.event_kinds import event_kind
 from pilotage.report.figures import layers
 from pilotage.report.figures.grid import draw_grid
+from pilotage.report.light_axes import LightAxes
 from pilotage.report.style import (
     BLACK,
     BLUE,
@@ -69,7 +70,9 @@ def close_ups_figure(run: RunData) -> Illustration:
     figure = Figure(figsize=(WIDTH_PT / 72.0, total / 72.0))
     for index, moment in enumerate(moments):
         left = left_pt + index * (side + gap_pt)
-        axes = figure.add_axes((left / WIDTH_PT, _BOTTOM_PT / total, side / WIDTH_PT, side / total))
+        axes = figure.add_axes(
+            (left / WIDTH_PT, _BOTTOM_PT / total, side / WIDTH_PT, side / total), axes_class=LightAxes
+        )
         x, y = (float(value) for value in path[moment.step])
         half_m = max(least_m, 1.3 * moment.error_m)
         axes.set_xlim(x - half_m, x + half_m)

@@ -12,6 +12,7 @@ from pilotage.core.types import FloatArray
 from pilotage.records.run_data import RunData
 from pilotage.report.figures import layers
 from pilotage.report.figures.grid import known_corners
+from pilotage.report.light_axes import LightAxes
 from pilotage.report.style import WIDTH_PT
 
 Limits: TypeAlias = tuple[float, float, float, float]
@@ -92,7 +93,9 @@ def map_axes(limits: Limits) -> tuple[Figure, Axes, float]:
     x_margin, y_margin = 0.5 * (width / scale - (x_max - x_min)), 0.5 * (height / scale - (y_max - y_min))
     total = height + _TOP_PT + _BOTTOM_PT
     figure = Figure(figsize=(WIDTH_PT / 72.0, total / 72.0))
-    axes = figure.add_axes((_LEFT_PT / WIDTH_PT, _BOTTOM_PT / total, width / WIDTH_PT, height / total))
+    axes = figure.add_axes(
+        (_LEFT_PT / WIDTH_PT, _BOTTOM_PT / total, width / WIDTH_PT, height / total), axes_class=LightAxes
+    )
     axes.set_xlim(x_min - x_margin, x_max + x_margin)
     axes.set_ylim(y_min - y_margin, y_max + y_margin)
     axes.set_autoscale_on(False)

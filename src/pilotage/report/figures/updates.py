@@ -16,6 +16,7 @@ from pilotage.records.updates import RecordedUpdate
 from pilotage.report.figures import layers
 from pilotage.report.figures.badge import badge
 from pilotage.report.figures.placing import LabelPlacer, along
+from pilotage.report.light_axes import LightAxes
 from pilotage.report.style import (
     BLACK,
     BLUE,
@@ -69,7 +70,9 @@ def updates_figure(run: RunData) -> Illustration:
         for column, update in enumerate(row):
             left = _LEFT_PT + column * (width + _GAP_PT)
             bottom = top - _TOP_PT - _MAP_PT
-            axes = figure.add_axes((left / WIDTH_PT, bottom / total, width / WIDTH_PT, _MAP_PT / total))
+            axes = figure.add_axes(
+                (left / WIDTH_PT, bottom / total, width / WIDTH_PT, _MAP_PT / total), axes_class=LightAxes
+            )
             _panel(axes, run, update, width)
             _list(figure, update, left, bottom - _ROWS_TOP_PT, total)
         top -= height + _PANEL_GAP_PT

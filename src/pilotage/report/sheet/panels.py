@@ -13,6 +13,7 @@ from matplotlib.path import Path as Outline
 from pilotage.core.types import BoolArray
 from pilotage.records.cells import SheetData
 from pilotage.report.figures.layers import line
+from pilotage.report.light_axes import LightAxes
 from pilotage.report.style import FAINT, GRID, INK, WIDTH_PT, one_shape
 
 _LEFT_PT, _RIGHT_PT, _TOP_PT, _BOTTOM_PT, _GAP_PT = 40.0, 8.0, 24.0, 32.0, 44.0
@@ -42,7 +43,7 @@ def sheet_panels(
         left = _LEFT_PT + column * (room + _GAP_PT) + 0.5 * (room - scale * across)
         bottom = _BOTTOM_PT + (rows - 1 - row) * each
         place = (left / WIDTH_PT, bottom / total, scale * across / WIDTH_PT, high / total)
-        axes = figure.add_axes(place)
+        axes = figure.add_axes(place, axes_class=LightAxes)
         axes.set_title(title)
         axes.set_xlim(-margin, width + margin)
         axes.set_ylim(-margin, height + margin)

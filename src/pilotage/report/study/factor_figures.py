@@ -18,6 +18,7 @@ from pilotage.evaluation.metric import words_and_unit
 from pilotage.experiments.studies.cells import Cell
 from pilotage.experiments.studies.groups import CellGroup
 from pilotage.experiments.studies.table import StudyTable
+from pilotage.report.light_axes import LightAxes
 from pilotage.report.study.panels import (
     dots_of,
     drawable,
@@ -114,7 +115,9 @@ def _factor_figure(
         line, across = divmod(place, PANELS_ACROSS)
         left = LEFT_PT + across * (width + GAP_X_PT)
         bottom = total - TOP_PT - PANEL_PT - line * (PANEL_PT + GAP_Y_PT)
-        axes = figure.add_axes((left / WIDTH_PT, bottom / total, width / WIDTH_PT, PANEL_PT / total))
+        axes = figure.add_axes(
+            (left / WIDTH_PT, bottom / total, width / WIDTH_PT, PANEL_PT / total), axes_class=LightAxes
+        )
         _factor_panel(axes, table, judgement, factor, metric, lines)
     keys = [Key(label, COLOURS[i % len(COLOURS)]) for i, (label, _) in enumerate(lines)]
     if any(metric in cell.published for _, cells in lines for cell in cells for metric in metrics):

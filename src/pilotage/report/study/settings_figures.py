@@ -13,6 +13,7 @@ from pilotage.evaluation.judge import Judgement
 from pilotage.experiments.studies.cells import Cell
 from pilotage.experiments.studies.groups import CellGroup
 from pilotage.experiments.studies.table import StudyTable
+from pilotage.report.light_axes import LightAxes
 from pilotage.report.study.factor_figures import lines_over
 from pilotage.report.study.panels import (
     dots_of,
@@ -64,7 +65,9 @@ def _figure(table: StudyTable, judgement: Judgement, group: CellGroup, slug: str
         line, across = divmod(number, PANELS_ACROSS)
         left = label_pt + across * (width + GAP_X_PT)
         bottom = total - line * height - TOP_PT - panel
-        axes = figure.add_axes((left / WIDTH_PT, bottom / total, width / WIDTH_PT, panel / total))
+        axes = figure.add_axes(
+            (left / WIDTH_PT, bottom / total, width / WIDTH_PT, panel / total), axes_class=LightAxes
+        )
         _panel(axes, table, judgement, metric, cells, labelled=across == 0)
     keys = [Key("mean with its 95 % interval", BLUE, "spot"), Key("a trial", FAINT, "spot")]
     if any(metric in cell.published for cell in cells for metric in metrics):

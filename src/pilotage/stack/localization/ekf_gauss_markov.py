@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from itertools import chain
 
 import numpy as np
 
@@ -50,6 +51,8 @@ TELEMETRY = {
     "axis_rad": gauss_markov.AXIS,
 }
 """Names of the errors in a trace; each has a standard deviation beside it."""
+PLACES = slice(gauss_markov.SPEED, gauss_markov.LANDMARKS)
+"""Of these in the state, in that order."""
 UNITS = {"_m_s": "m/s", "_rad_s": "rad/s", "_rad": "rad", "_m": "m", "_s": "s"}
 COLUMNS = {
     **SIGHTING_COLUMNS,
@@ -224,7 +227,7 @@ class EkfGaussMarkovLocalizer:
         gain = max(commands.speed_gain - commands.speed_loss_per_rad_s * claimed_rate, 0.0)
         moved = gain * distance
         turned = commands.turn_gain * angle + commands.bend_rad_per_m * moved
-        distance_var, angle_var = self._noise.variances(OdometryIncrement(moved, turned))
+        distance_var, angle_var = self._noise.variances_of(moved, turned)
         gauss_markov.predict(
             self._state,
             self._cov,
@@ -334,10 +337,8 @@ class EkfGaussMarkovLocalizer:
         return np.diag([along, across])
 
     def _tell(self, seen: int, accepted: int, nis: float) -> None:
-        state, cov = self._state, self._cov
-        errors: list[float] = []
-        for place in TELEMETRY.values():
-            errors += (float(state[place]), math.sqrt(max(float(cov[place, place]), 0.0)))
+        errors = self._state[PLACES].tolist()
+        stds = np.sqrt(np.maximum(self._cov.diagonal()[PLACES], 0.0)).tolist()
         self._telemetry.tell(
             seen,
             accepted,
@@ -346,7 +347,7 @@ class EkfGaussMarkovLocalizer:
             accepted * self._expected_nis if accepted else math.nan,
             0.0 if self._lost else 1.0,
             self.recoveries,
-            *errors,
+            *chain.from_iterable(zip(errors, stds, strict=True)),
         )
 
 

@@ -70,11 +70,15 @@ class OdometryPrediction:
 
     def variances(self, odometry: OdometryIncrement) -> tuple[float, float]:
         """Variances of an increment's distance and angle."""
-        distance, angle = increment_variances(odometry.distance_m, odometry.angle_rad, *self._densities)
+        distance, angle = self.variances_of(odometry.distance_m, odometry.angle_rad)
         if odometry.lateral_m != 0.0:
             angle += increment_variances(odometry.lateral_m, 0.0, *self._densities)[1]
         own, part = odometry.angle_var_rad2, odometry.part_var
         return distance + part[0], (angle if own is None else own) + part[2]
+
+    def variances_of(self, distance_m: float, angle_rad: float) -> tuple[float, float]:
+        """The same of a distance and an angle that say nothing else."""
+        return increment_variances(distance_m, angle_rad, *self._densities)
 
     def lateral_variance(self, odometry: OdometryIncrement) -> float:
         """Variance of what an increment tells of driving to the left, which errs as driving forwards does."""
