@@ -17,6 +17,7 @@ from pilotage.experiments.mission import load_mission, mission_of, read_mission
 from pilotage.kernels.control import disc_returns
 from pilotage.stack.navigator.patrol.passage import claimed, precedes, relation, stretch_of
 from pilotage.stack.navigator.patrol.still import StillWatch
+from pilotage.stack.patrol.passages import BESIDE_M
 
 NOBODY = np.zeros((0, 3))
 
@@ -195,6 +196,10 @@ class TestPassages:
             assert abs(y - 3.0) > 1.1 or x < 1.0
             assert all(math.hypot(x - a, y - b) > 0.8 for a, b in others)
             others.append([x, y])
+
+    def test_plans_and_claims_agree_on_what_two_pass_each_other_in(self) -> None:
+        context = build(mission_of(corridor(3.0, 1, 10.0), seed=0)).team[0].stack._context  # type: ignore[attr-defined]
+        assert context.pass_m == pytest.approx(2.0 * context.radius_m + BESIDE_M)
 
     def test_a_robot_that_died_in_the_passage_is_not_run_into(self) -> None:
         failures = [{"robot": 0, "at_s": 12.0}, {"robot": 1, "kind": "radio", "at_s": 1.0}]
