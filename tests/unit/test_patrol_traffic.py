@@ -42,6 +42,17 @@ def corridor(width_m: float, size: int, duration_s: float, **team: Any) -> dict[
     return values
 
 
+def hall_beside_a_corridor() -> dict[str, Any]:
+    """The corridor, 1.5 m wide, without its rooms; a door leads from its middle into one of 4 m x 2.25 m."""
+    values = corridor(1.5, 1, 10.0)
+    walls = values["world"]["map"]["walls_m"]
+    walls.remove([4, 2.25, 12, 2.25])
+    walls += [[4, 2.25, 7.5, 2.25], [8.5, 2.25, 12, 2.25], [4, 2.25, 4, 3.75], [12, 2.25, 12, 3.75]]
+    walls += [[6, 0, 10, 0], [6, 0, 6, 2.25], [10, 0, 10, 2.25]]
+    values["task"]["derive"]["reach_m"] = 3.0
+    return values
+
+
 def judged(values: dict[str, Any], seed: int) -> dict[str, Any]:
     experiment = build(mission_of(values, seed=seed))
     return experiment.task.judge(run_loop(experiment).finished).metrics
@@ -196,6 +207,20 @@ class TestPassages:
             assert abs(y - 3.0) > 1.1 or x < 1.0
             assert all(math.hypot(x - a, y - b) > 0.8 for a, b in others)
             others.append([x, y])
+
+    def test_where_a_corridor_is_all_there_is_it_stands_off_the_path_that_is_told(self) -> None:
+        """Before the door was the only place with room for two: there it stood, and nobody came out of it."""
+        values = hall_beside_a_corridor()
+        values["world"]["start"] = {"x_m": 8.0, "y_m": 1.0, "theta_rad": 0.0}
+        roadmap = build(mission_of(values, seed=0)).team[0].stack._context.roadmap  # type: ignore[attr-defined]
+        mouth, outwards = np.array([8.0, 2.6]), np.array([0.0, 1.0])
+        path = np.array([[8.0, 2.1], [8.0, 2.6], [8.5, 3.0], [9.0, 3.0], [9.5, 3.0]])
+        for coming in (path, path * [-1.0, 1.0] + [16.0, 0.0]):
+            field = roadmap.refuge(8.2, 3.0, mouth, outwards, np.zeros((0, 2)), 0.76, 1.0, None, coming)
+            row, column = np.argwhere(field == 0.0).mean(axis=0)
+            x, y = roadmap.origin_xy_m + roadmap.spacing_m * np.array([column, row])
+            assert np.hypot(*(coming - [x, y]).T).min() >= 1.0
+            assert y > 2.25
 
     def test_plans_and_claims_agree_on_what_two_pass_each_other_in(self) -> None:
         context = build(mission_of(corridor(3.0, 1, 10.0), seed=0)).team[0].stack._context  # type: ignore[attr-defined]

@@ -22,6 +22,8 @@ OFF_RATIO, AHEAD_M = 1.8, 3.5
 """Who waits beside a passage stands so many half widths of two off its axis, or so far before it."""
 FINER, MOST_NODES = (1, 2, 4), 2_000_000
 """Nodes may lie beside a passage that the body just fits through: then they lie so many times as near."""
+SHORT_M = 0.3
+"""Who stands aside may stop so far before the place that it goes to."""
 NEARER_M = 0.05
 """Who leaves somebody may come so much nearer: nodes lie beside where it is."""
 NEAREST = 6
@@ -277,11 +279,13 @@ class Roadmap:
         pass_m: float,
         keep_m: float,
         met_xy_m: FloatArray | None = None,
+        coming_xy_m: FloatArray | None = None,
     ) -> FloatArray | None:
         """(rows, columns) time to the nearest place where nobody stands who is in the way of who comes out.
 
-        It has room for two, lies off the passage's axis and before no other, or else as far from its mouth as
-        there is room, within ``ASIDE_REACH_M``. None where there is none.
+        It has room for two, lies off the passage's axis and before no other; or else off the paths of those
+        who come, be there room for one only; or else as far from the mouth as there is room for two. All
+        within ``ASIDE_REACH_M``; None where there is none.
 
         Parameters
         ----------
@@ -294,6 +298,8 @@ class Roadmap:
         met_xy_m
             (2,) of who is met: the path leads away from there, be it through a passage; without it through
             none.
+        coming_xy_m
+            (L, 2) of the paths of those who come out, to keep ``keep_m`` from.
         """
         wide = np.isfinite(self.slowness) & (self._room_m >= pass_m)
         axis = outwards / max(float(np.hypot(*outwards)), 1e-9)
@@ -310,17 +316,39 @@ class Roadmap:
         free = away <= ASIDE_REACH_M
         for body in bodies_xy_m:
             free &= np.hypot(*(places - body).T) >= keep_m
-        if not free.any():
-            return None
         off, ahead = np.abs(offset @ np.array([-axis[1], axis[0]])), offset @ axis
         narrow_m = self.spacing_m * scipy.ndimage.distance_transform_edt(wide | ~np.isfinite(self.slowness))
         clear = (
             free & ((off >= OFF_RATIO * pass_m) | (ahead >= AHEAD_M)) & (narrow_m[rows, columns] >= pass_m)
         )
-        when = time[rows, columns]
-        best = int(np.argmin(np.where(clear, when, np.inf))) if clear.any() else _farthest(free, away)
-        x, y = places[best].tolist()
-        return self.field_to(x, y)
+        if clear.any():
+            best = int(np.argmin(np.where(clear, time[rows, columns], np.inf)))
+            return self.field_to(*places[best].tolist())
+        if coming_xy_m is not None and len(coming_xy_m):
+            place = self._beside(x_m, y_m, coming_xy_m, bodies_xy_m, keep_m)
+            if place is not None:
+                return self.field_to(*place)
+        return self.field_to(*places[_farthest(free, away)].tolist()) if free.any() else None
+
+    def _beside(
+        self, x_m: float, y_m: float, lines_xy_m: FloatArray, bodies_xy_m: FloatArray, keep_m: float
+    ) -> tuple[float, float] | None:
+        """The place reached soonest that is off paths (L, 2) and bodies (K, 2), past none of these."""
+        nodes, here = self._nodes_xy_m(), np.array([x_m, y_m])
+        free, off = np.isfinite(self.slowness), np.ones(self.slowness.shape, dtype=np.bool_)
+        for body in bodies_xy_m:
+            away_m = np.hypot(*(nodes - body).transpose(2, 0, 1))
+            free &= away_m >= min(keep_m, math.dist(body, here))
+            off &= away_m >= keep_m
+        for place in lines_xy_m:
+            off &= np.hypot(*(nodes - place).transpose(2, 0, 1)) >= keep_m + SHORT_M
+        off &= np.hypot(*(nodes - here).transpose(2, 0, 1)) <= ASIDE_REACH_M
+        time = np.where(free & off, self._from(x_m, y_m, np.where(free, self.slowness, np.inf)), np.inf)
+        best = np.unravel_index(int(np.argmin(time)), time.shape)
+        if not math.isfinite(time[best]):
+            return None
+        x, y = nodes[best].tolist()
+        return x, y
 
     def _without(self, other_xy_m: FloatArray, x_m: float, y_m: float, keep_m: float) -> BoolArray:
         """(rows, columns) where one at a place may go who keeps from another.

@@ -19,6 +19,7 @@ from pilotage.stack.navigator.patrol.passage import CLAIM_M, Stretch, claimed, p
 from pilotage.stack.patrol.roadmap import STEP_M
 from pilotage.stack.patrol.word import Claim
 
+NO_PLACES: FloatArray = np.empty((0, 2))
 RECEDES_M_S = 0.1
 """Who goes ahead through a passage at this speed is followed."""
 ROOM_M = 0.4
@@ -130,6 +131,17 @@ def is_taken(context: Context, stretch: Stretch) -> bool:
     )
 
 
+def is_held_up(context: Context, vertex: int) -> bool:
+    """From where it stands aside in a passage: whether others are to go first on the path to a vertex.
+
+    It claims no more than where it is: who claims what others are let through waits for them, and they for
+    it.
+    """
+    stretch = stretch_of(way_to(context, vertex), context.pass_m)
+    look_along(context, context.here())
+    return stretch is not None and is_taken(context, stretch)
+
+
 def _is_readier(context: Context, stretch: Stretch, number: int, claim: Claim) -> bool:
     """Whether a mate on the same side is to enter first: who is nearer, or has waited for long."""
     own, word, (x, y) = context.claim, context.mates[number][1], stretch.line_xy_m[0].tolist()
@@ -195,19 +207,31 @@ def retreat(context: Context, stretch: Stretch) -> FloatArray | None:
     return None if out is None else refuge(context, out.mouth_xy_m, out.outwards)
 
 
+def aside(context: Context, stretch: Stretch) -> FloatArray | None:
+    """From outside: the field to a place aside of a passage, off the paths told by those who come through."""
+    coming = [c.line_xy_m for _, c, how in rivals(context, stretch.line_xy_m) if how < 0]
+    return refuge(
+        context, stretch.line_xy_m[0], stretch.outwards, coming_xy_m=np.concatenate([NO_PLACES, *coming])
+    )
+
+
 def refuge(
-    context: Context, mouth_xy_m: FloatArray, outwards: FloatArray, met_xy_m: FloatArray | None = None
+    context: Context,
+    mouth_xy_m: FloatArray,
+    outwards: FloatArray,
+    met_xy_m: FloatArray | None = None,
+    coming_xy_m: FloatArray | None = None,
 ) -> FloatArray | None:
     """The field to a place aside of a passage's mouth where nobody stands, as far as is seen and told.
 
-    Away from (2,) somebody who is met.
+    Away from (2,) somebody who is met, and off paths (L, 2).
     """
     told = [[word.x_m, word.y_m] for _, word in context.heard() if math.isfinite(word.x_m)]
     others = np.concatenate([context.bodies_on_map(), np.array(told).reshape(-1, 2)])
     keep_m = 2.0 * context.radius_m + ROOM_M
     pose = context.pose
     return context.roadmap.refuge(
-        pose.x_m, pose.y_m, mouth_xy_m, outwards, others, context.pass_m, keep_m, met_xy_m
+        pose.x_m, pose.y_m, mouth_xy_m, outwards, others, context.pass_m, keep_m, met_xy_m, coming_xy_m
     )
 
 

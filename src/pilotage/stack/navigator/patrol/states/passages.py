@@ -75,14 +75,19 @@ class StandingAside:
             return to.resume(context)
         if not context.fresh:
             return Move(self, command)
-        if context.is_narrow():
+        is_there = context.motion.to_go_s <= THERE_S
+        if context.is_narrow() and not is_there:
             # Still in it: the others are told which way it goes.
             traffic.look_along(context, traffic.way_along(context, self.time))
             return Move(self, command)
+        if context.is_narrow():
+            waits = traffic.is_held_up(context, context.hop)
+            waits |= not context.hears_all() and context.t_s < self.until_s
+            return Move(self, context.motion.stand()) if waits else to.resume(context)
         stretch = traffic.look(context, context.hop)
         if stretch is None or (context.hears_all() and not traffic.is_taken(context, stretch)):
             return to.resume(context)
-        if context.motion.to_go_s > THERE_S:
+        if not is_there:
             # Somebody else may stand there now.
             kept_out = waited_s > SETTLED_S and context.at_rest
             return to.resume(context) if kept_out else Move(self, command)

@@ -120,9 +120,7 @@ def meet(context: Context, stretch: Stretch | None, since_s: float) -> Move | No
     if not stretch.inside:
         if stretch.mouth_m > MOUTH_M or not traffic.is_taken(context, stretch):
             return None
-        return stand_aside(
-            context, traffic.refuge(context, stretch.line_xy_m[0], stretch.outwards), stretch, since_s
-        )
+        return stand_aside(context, traffic.aside(context, stretch), stretch, since_s)
     lost = traffic.has_lost(context, stretch)
     if lost:
         return back_out(context, traffic.retreat(context, stretch), stretch, since_s)
