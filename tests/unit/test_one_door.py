@@ -77,7 +77,6 @@ ALLOWED = {
         "*.read_text",
     ): "what stands where the same text is to be written",
     ("experiments/studies/study.py", "json.loads"): "of what json.dumps wrote, or of one override",
-    ("experiments/studies/replay.py", "json.loads"): "of what json.dumps just wrote",
     ("experiments/studies/dask_workers.py", "json.loads"): "of the text that the study's own process sent",
     (
         "experiments/studies/database.py",
