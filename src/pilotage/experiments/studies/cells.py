@@ -132,7 +132,7 @@ def _cell(
         row, key=lambda pair: pair[0].levels is None and not _names_component(pair[0].keys)
     ):
         if factor.levels is not None:
-            before = partial(_given, resolved)
+            before = partial(resolve, overrides)
             overrides = (*overrides, *as_overrides(factor.levels[value]))
             resolved = resolve(overrides)
             _check_keys(factor.levels[value], resolved, f"level '{value}'", before)
@@ -149,10 +149,6 @@ def _cell(
         str(value) if factor.levels is not None else f"{factor.title}={show(value)}" for factor, value in row
     ]
     return Cell(index, ", ".join(words) or "mission", values, overrides, {})
-
-
-def _given(values: Mapping[str, Any] | None) -> Mapping[str, Any] | None:
-    return values
 
 
 def show(value: Any) -> str:
