@@ -18,6 +18,7 @@ from pilotage.kernels.control import disc_returns
 from pilotage.stack.navigator.patrol.passage import claimed, precedes, relation, stretch_of
 from pilotage.stack.navigator.patrol.still import StillWatch
 from pilotage.stack.patrol.passages import BESIDE_M
+from pilotage.stack.patrol.refuges import refuge
 
 NOBODY = np.zeros((0, 3))
 
@@ -201,7 +202,7 @@ class TestPassages:
         mouth, outwards = np.array([4.2, 3.0]), np.array([-1.0, 0.0])
         others: list[list[float]] = []
         for _ in range(3):
-            field = roadmap.refuge(2.8, 3.0, mouth, outwards, np.array(others).reshape(-1, 2), 0.73, 1.0)
+            field = refuge(roadmap, 2.8, 3.0, mouth, outwards, np.array(others).reshape(-1, 2), 0.73, 1.0)
             row, column = np.argwhere(field == 0.0).mean(axis=0)
             x, y = roadmap.spacing_m * column, roadmap.spacing_m * row
             assert abs(y - 3.0) > 1.1 or x < 1.0
@@ -216,7 +217,7 @@ class TestPassages:
         mouth, outwards = np.array([8.0, 2.6]), np.array([0.0, 1.0])
         path = np.array([[8.0, 2.1], [8.0, 2.6], [8.5, 3.0], [9.0, 3.0], [9.5, 3.0]])
         for coming in (path, path * [-1.0, 1.0] + [16.0, 0.0]):
-            field = roadmap.refuge(8.2, 3.0, mouth, outwards, np.zeros((0, 2)), 0.76, 1.0, None, coming)
+            field = refuge(roadmap, 8.2, 3.0, mouth, outwards, np.zeros((0, 2)), 0.76, 1.0, None, coming)
             row, column = np.argwhere(field == 0.0).mean(axis=0)
             x, y = roadmap.origin_xy_m + roadmap.spacing_m * np.array([column, row])
             assert np.hypot(*(coming - [x, y]).T).min() >= 1.0

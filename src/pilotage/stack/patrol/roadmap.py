@@ -4,28 +4,22 @@ from __future__ import annotations
 
 import copy
 import math
-from dataclasses import dataclass
 from threading import RLock
 
 import numpy as np
 import scipy
 
 from pilotage.core.errors import InputError
-from pilotage.core.types import BoolArray, FloatArray, IntArray
+from pilotage.core.types import FloatArray, IntArray
 from pilotage.kernels.control import eikonal
 from pilotage.maps.known_maps import OncePerMap
 from pilotage.maps.world_map import WorldMap
 from pilotage.stack.patrol.nodes import Ground
 
-STEP_M, ASIDE_REACH_M = 0.25, 6.0
-OFF_RATIO, AHEAD_M = 1.8, 3.5
-"""Who waits beside a passage stands so many half widths of two off its axis, or so far before it."""
+STEP_M = 0.25
+"""Of paths."""
 FINER, MOST_NODES = (1, 2, 4), 2_000_000
 """Nodes may lie beside a passage that the body just fits through: then they lie so many times as near."""
-SHORT_M = 0.3
-"""Who stands aside may stop so far before the place that it goes to."""
-NEARER_M = 0.05
-"""Who leaves somebody may come so much nearer: nodes lie beside where it is."""
 NEAREST = 6
 MOST_FIELD_BYTES = 256_000_000
 """Of fields that are kept; beyond that who was not asked for longest is worked out again."""
@@ -33,15 +27,6 @@ _LOCK = RLock()
 """Of what is worked out when asked for: trials in threads of one process share a map's roadmap."""
 STATION_M = 0.4
 """So far from a charging station the body may have to stand, for a wall beside it."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class WayOut:
-    """To the end of a passage: time, where that is (2,), and the direction out of it there (2,)."""
-
-    time_s: float
-    mouth_xy_m: FloatArray
-    outwards: FloatArray
 
 
 class Roadmap:
@@ -53,6 +38,8 @@ class Roadmap:
         (rows, columns) seconds a metre; infinite where the body does not fit.
     origin_xy_m, spacing_m
         Of the nodes; row 0 has the lowest y.
+    room_m
+        (rows, columns) half the width of the passage there.
     places_xy_m
         (V + N, 2) places to visit, then charging stations.
 
@@ -99,7 +86,7 @@ class Roadmap:
     def _lay(self, spacing_m: float) -> None:
         """Lay the nodes over the ground."""
         self.spacing_m, self.origin_xy_m = spacing_m, self._ground.bounds_m[:2]
-        self.slowness, self._room_m, self._width_m = self._ground.nodes(spacing_m)
+        self.slowness, self.room_m, self._width_m = self._ground.nodes(spacing_m)
         # Where there is room for all fields nobody need know which of them was asked for last.
         self._all_kept = len(self._places) * self.slowness.nbytes <= MOST_FIELD_BYTES
         self._seeds = self._joined(self._ground.clearance_m)
@@ -163,14 +150,14 @@ class Roadmap:
         A place is as good from the nearest node within ``near_m`` that can be reached from ``here_xy_m``; one
         without such a node is cut off, and its field stays what it was.
         """
-        found, nodes = copy.copy(self), self._nodes_xy_m()
+        found, nodes = copy.copy(self), self.nodes_xy_m()
         found.slowness = self.slowness.copy()
         for disc in discs:
             found.slowness[np.hypot(*(nodes - disc[:2]).transpose(2, 0, 1)) < disc[2]] = np.inf
         free = np.isfinite(found.slowness)
         regions, _ = scipy.ndimage.label(free)
         # The nearest node by time: as the crow flies it may lie behind a wall.
-        time = np.where(free, self._from(*here_xy_m, self.slowness), np.inf)
+        time = np.where(free, self.field_to(*here_xy_m), np.inf)
         reached = free & (regions == regions[np.unravel_index(int(np.argmin(time)), time.shape)])
         rows, columns = np.nonzero(reached)
         cut_off = []
@@ -199,7 +186,7 @@ class Roadmap:
             x0, y0 = self.origin_xy_m
             x, y = x0 + seed[1] * self.spacing_m, y0 + seed[0] * self.spacing_m
             steps = whole.way(x, y, field, float(field[seed]) / float(np.min(self.slowness)))
-            if all(np.isfinite(self.slowness[self._node(*place)]) for place in steps[:, :2].tolist()):
+            if all(np.isfinite(self.slowness[self.node(*place)]) for place in steps[:, :2].tolist()):
                 return 1.0
         around_s = float(self.time_s(other)[self._seeds[one]])
         before_s = float(field[seed])
@@ -245,154 +232,35 @@ class Roadmap:
                 del self._fields[next(iter(self._fields))]
             return field
 
-    def way_out(
-        self, x_m: float, y_m: float, other_xy_m: tuple[float, float], keep_m: float, pass_m: float
-    ) -> WayOut | None:
-        """The nearest end of the passage that a place is in, not past another; None where there is none.
-
-        Parameters
-        ----------
-        keep_m
-            To keep from the other; as near as it is already is allowed.
-        pass_m
-            Half the width of what has room for two.
-        """
-        places = self._nodes_xy_m()
-        free = self._without(np.array(other_xy_m), x_m, y_m, keep_m)
-        time = self._from(x_m, y_m, np.where(free, self.slowness, np.inf))
-        ends = np.where(self._room_m >= pass_m, time, np.inf)
-        best = np.unravel_index(int(np.argmin(ends)), ends.shape)
-        if not math.isfinite(ends[best]):
-            return None
-        mouth = places[best]
-        x, y = mouth.tolist()
-        inwards = eikonal.descent(x, y, time, *self.origin_xy_m, self.spacing_m)
-        return WayOut(float(ends[best]), mouth, -np.array(inwards))
-
-    def refuge(
-        self,
-        x_m: float,
-        y_m: float,
-        mouth_xy_m: FloatArray,
-        outwards: FloatArray,
-        bodies_xy_m: FloatArray,
-        pass_m: float,
-        keep_m: float,
-        met_xy_m: FloatArray | None = None,
-        coming_xy_m: FloatArray | None = None,
-    ) -> FloatArray | None:
-        """(rows, columns) time to the nearest place where nobody stands who is in the way of who comes out.
-
-        It has room for two, lies off the passage's axis and before no other; or else off the paths of those
-        who come, be there room for one only; or else as far from the mouth as there is room for two. All
-        within ``ASIDE_REACH_M``; None where there is none.
-
-        Parameters
-        ----------
-        mouth_xy_m, outwards
-            (2,) where the passage ends and the direction in which it does.
-        bodies_xy_m
-            (K, 2) of others, to keep ``keep_m`` from.
-        pass_m
-            Half the width of what has room for two, and the distance to keep from the axis.
-        met_xy_m
-            (2,) of who is met: the path leads away from there, be it through a passage; without it through
-            none.
-        coming_xy_m
-            (L, 2) of the paths of those who come out, to keep ``keep_m`` from.
-        """
-        wide = np.isfinite(self.slowness) & (self._room_m >= pass_m)
-        axis = outwards / max(float(np.hypot(*outwards)), 1e-9)
-        ground = wide if met_xy_m is None else self._without(met_xy_m, x_m, y_m, pass_m)
-        starts_here = met_xy_m is not None or wide[self._node(x_m, y_m)]
-        x, y = (x_m, y_m) if starts_here else (mouth_xy_m + STEP_M * axis).tolist()
-        time = self._from(x, y, np.where(ground, self.slowness, np.inf))
-        # Not close to a wall: there it would take long to come to, and away from.
-        fit = wide & np.isfinite(time) & (self.slowness < 1.2 * self.slowness.min())
-        rows, columns = np.nonzero(fit)
-        places = np.column_stack([columns, rows]) * self.spacing_m + np.array(self.origin_xy_m)
-        offset = places - mouth_xy_m
-        away = np.hypot(*offset.T)
-        free = away <= ASIDE_REACH_M
-        for body in bodies_xy_m:
-            free &= np.hypot(*(places - body).T) >= keep_m
-        off, ahead = np.abs(offset @ np.array([-axis[1], axis[0]])), offset @ axis
-        narrow_m = self.spacing_m * scipy.ndimage.distance_transform_edt(wide | ~np.isfinite(self.slowness))
-        clear = (
-            free & ((off >= OFF_RATIO * pass_m) | (ahead >= AHEAD_M)) & (narrow_m[rows, columns] >= pass_m)
-        )
-        if clear.any():
-            best = int(np.argmin(np.where(clear, time[rows, columns], np.inf)))
-            return self.field_to(*places[best].tolist())
-        if coming_xy_m is not None and len(coming_xy_m):
-            place = self._beside(x_m, y_m, coming_xy_m, bodies_xy_m, keep_m)
-            if place is not None:
-                return self.field_to(*place)
-        return self.field_to(*places[_farthest(free, away)].tolist()) if free.any() else None
-
-    def _beside(
-        self, x_m: float, y_m: float, lines_xy_m: FloatArray, bodies_xy_m: FloatArray, keep_m: float
-    ) -> tuple[float, float] | None:
-        """The place reached soonest that is off paths (L, 2) and bodies (K, 2), past none of these."""
-        nodes, here = self._nodes_xy_m(), np.array([x_m, y_m])
-        free, off = np.isfinite(self.slowness), np.ones(self.slowness.shape, dtype=np.bool_)
-        for body in bodies_xy_m:
-            away_m = np.hypot(*(nodes - body).transpose(2, 0, 1))
-            free &= away_m >= min(keep_m, math.dist(body, here))
-            off &= away_m >= keep_m
-        for place in lines_xy_m:
-            off &= np.hypot(*(nodes - place).transpose(2, 0, 1)) >= keep_m + SHORT_M
-        off &= np.hypot(*(nodes - here).transpose(2, 0, 1)) <= ASIDE_REACH_M
-        time = np.where(free & off, self._from(x_m, y_m, np.where(free, self.slowness, np.inf)), np.inf)
-        best = np.unravel_index(int(np.argmin(time)), time.shape)
-        if not math.isfinite(time[best]):
-            return None
-        x, y = nodes[best].tolist()
-        return x, y
-
-    def _without(self, other_xy_m: FloatArray, x_m: float, y_m: float, keep_m: float) -> BoolArray:
-        """(rows, columns) where one at a place may go who keeps from another.
-
-        Who is nearer to it already goes away from it: nothing leads on beside who is met.
-        """
-        nodes, here = self._nodes_xy_m(), np.array([x_m, y_m])
-        here_m = math.dist(other_xy_m, here)
-        away_m = np.hypot(*(nodes - other_xy_m).transpose(2, 0, 1))
-        free: BoolArray = np.isfinite(self.slowness) & (away_m >= min(keep_m, here_m))
-        if here_m < keep_m:
-            free &= (away_m >= 2.0 * keep_m) | ((nodes - here) @ (other_xy_m - here) <= NEARER_M * here_m)
-        return free
-
-    def field_to(self, x_m: float, y_m: float) -> FloatArray:
-        """(rows, columns) time to go to any place."""
-        return self._from(x_m, y_m, self.slowness)
-
-    def _nodes_xy_m(self) -> FloatArray:
-        rows, columns = self.slowness.shape
-        x0, y0 = self.origin_xy_m
-        xs, ys = x0 + self.spacing_m * np.arange(columns), y0 + self.spacing_m * np.arange(rows)
-        return np.stack(np.meshgrid(xs, ys), axis=-1)
-
-    def _node(self, x_m: float, y_m: float) -> tuple[int, int]:
-        rows, columns = self.slowness.shape
-        row = round((y_m - self.origin_xy_m[1]) / self.spacing_m)
-        column = round((x_m - self.origin_xy_m[0]) / self.spacing_m)
-        return min(max(row, 0), rows - 1), min(max(column, 0), columns - 1)
-
-    def _from(self, x_m: float, y_m: float, slow: FloatArray) -> FloatArray:
-        """(rows, columns) time to go from a place, or to it."""
+    def field_to(self, x_m: float, y_m: float, slowness: FloatArray | None = None) -> FloatArray:
+        """(rows, columns) time to go to any place, or from it; over its own slowness where none is given."""
+        slow = self.slowness if slowness is None else slowness
         field = np.full(self.slowness.shape, np.inf)
-        row, column = self._node(x_m, y_m)
+        row, column = self.node(x_m, y_m)
         near = slice(max(0, row - 1), row + 2), slice(max(0, column - 1), column + 2)
         field[near][np.isfinite(slow[near])] = 0.0
         eikonal.sweep_down(field, slow, self.spacing_m)
         return field
 
+    def nodes_xy_m(self) -> FloatArray:
+        """(rows, columns, 2) where the nodes are."""
+        rows, columns = self.slowness.shape
+        x0, y0 = self.origin_xy_m
+        xs, ys = x0 + self.spacing_m * np.arange(columns), y0 + self.spacing_m * np.arange(rows)
+        return np.stack(np.meshgrid(xs, ys), axis=-1)
+
+    def node(self, x_m: float, y_m: float) -> tuple[int, int]:
+        """Row and column of the node nearest to a place."""
+        rows, columns = self.slowness.shape
+        row = round((y_m - self.origin_xy_m[1]) / self.spacing_m)
+        column = round((x_m - self.origin_xy_m[0]) / self.spacing_m)
+        return min(max(row, 0), rows - 1), min(max(column, 0), columns - 1)
+
     def way(self, x_m: float, y_m: float, time_s: FloatArray, reach_m: float) -> FloatArray:
         """(N, 3) places every ``STEP_M`` down a field, and half the width of the passage at each."""
         steps = math.ceil(reach_m / STEP_M)
         return eikonal.way_down(
-            x_m, y_m, time_s, self._room_m, *self.origin_xy_m, self.spacing_m, STEP_M, steps
+            x_m, y_m, time_s, self.room_m, *self.origin_xy_m, self.spacing_m, STEP_M, steps
         )
 
     def narrowest_m(
@@ -403,17 +271,13 @@ class Roadmap:
         Infinite off the map.
         """
         steps, few = math.ceil(reach_m / STEP_M), math.ceil(soon_m / STEP_M)
-        ground = self._room_m, self._width_m, *self.origin_xy_m, self.spacing_m
+        ground = self.room_m, self._width_m, *self.origin_xy_m, self.spacing_m
         return eikonal.narrowest_down(x_m, y_m, time_s, *ground, STEP_M, steps, few)
 
     def away_m(self, place: int, x_m: float, y_m: float) -> float:
         """How far a place is from another as the crow flies."""
         x, y = self._places[place]
         return math.hypot(x_m - x, y_m - y)
-
-
-def _farthest(free: BoolArray, away_m: FloatArray) -> int:
-    return int(np.argmax(np.where(free, away_m, -np.inf)))
 
 
 _ROADMAPS: OncePerMap[Roadmap] = OncePerMap()

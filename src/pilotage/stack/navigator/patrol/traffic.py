@@ -16,6 +16,7 @@ from pilotage.core.types import FloatArray
 from pilotage.kernels.control import disc_returns, eikonal
 from pilotage.stack.navigator.patrol.context import Context
 from pilotage.stack.navigator.patrol.passage import CLAIM_M, Stretch, claimed, precedes, relation, stretch_of
+from pilotage.stack.patrol import refuges
 from pilotage.stack.patrol.roadmap import STEP_M
 from pilotage.stack.patrol.word import Claim
 
@@ -189,8 +190,8 @@ def has_less_far(context: Context, stretch: Stretch) -> tuple[bool, FloatArray |
         return False, None
     x, y = bodies[int(np.argmin(away))].tolist()
     # Nothing leads past it: the passage has room for one.
-    own = roadmap.way_out(pose.x_m, pose.y_m, (x, y), context.pass_m, context.pass_m)
-    theirs = roadmap.way_out(x, y, (pose.x_m, pose.y_m), context.pass_m, context.pass_m)
+    own = refuges.way_out(roadmap, pose.x_m, pose.y_m, (x, y), context.pass_m, context.pass_m)
+    theirs = refuges.way_out(roadmap, x, y, (pose.x_m, pose.y_m), context.pass_m, context.pass_m)
     own_m, their_m = (math.inf if out is None else out.time_s * context.speed_m_s for out in (own, theirs))
     if own is None:
         return False, None
@@ -203,7 +204,7 @@ def retreat(context: Context, stretch: Stretch) -> FloatArray | None:
     pose = context.pose
     ahead = stretch.line_xy_m[min(3, len(stretch.line_xy_m) - 1)]
     x, y = ahead.tolist()
-    out = context.roadmap.way_out(pose.x_m, pose.y_m, (x, y), 0.3, context.pass_m)
+    out = refuges.way_out(context.roadmap, pose.x_m, pose.y_m, (x, y), 0.3, context.pass_m)
     return None if out is None else refuge(context, out.mouth_xy_m, out.outwards)
 
 
@@ -230,8 +231,17 @@ def refuge(
     others = np.concatenate([context.bodies_on_map(), np.array(told).reshape(-1, 2)])
     keep_m = 2.0 * context.radius_m + ROOM_M
     pose = context.pose
-    return context.roadmap.refuge(
-        pose.x_m, pose.y_m, mouth_xy_m, outwards, others, context.pass_m, keep_m, met_xy_m, coming_xy_m
+    return refuges.refuge(
+        context.roadmap,
+        pose.x_m,
+        pose.y_m,
+        mouth_xy_m,
+        outwards,
+        others,
+        context.pass_m,
+        keep_m,
+        met_xy_m,
+        coming_xy_m,
     )
 
 
