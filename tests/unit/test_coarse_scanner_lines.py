@@ -9,7 +9,7 @@ import numpy as np
 from pilotage.core.angles import wrap_array_to_pi
 from pilotage.core.types import Pose2
 from pilotage.experiments.build.charts import load_chart
-from pilotage.experiments.build.places import random_pose
+from pilotage.experiments.build.open_floor import random_pose
 from pilotage.maps.wall_lines import WallLines
 from pilotage.missions.places import PoseConfig
 from pilotage.sensors.lidar import LidarConfig

@@ -12,7 +12,7 @@ from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, Pose2, Twist
 from pilotage.experiments.build.build import build
 from pilotage.experiments.build.charts import load_chart
-from pilotage.experiments.build.places import random_pose
+from pilotage.experiments.build.open_floor import random_pose
 from pilotage.experiments.mission import load_mission
 from pilotage.experiments.resolve import resolved_yaml
 from pilotage.kernels.arrays import read_only

@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 
 from pilotage.core.errors import InputError
-from pilotage.experiments.build import places
+from pilotage.experiments.build import open_floor
 from pilotage.experiments.build.charts import chart_of
-from pilotage.experiments.build.places import OpenFloor, settle_places
+from pilotage.experiments.build.open_floor import OpenFloor
+from pilotage.experiments.build.places import settle_places
 from pilotage.experiments.mission import load_mission
+from pilotage.maps.pieces import meant_piece
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.maps.world_map import WorldMap
 from pilotage.missions.mission import Mission
@@ -61,6 +63,47 @@ def test_a_place_beside_a_wall_tells_which_floor_a_task_is_about(
     assert all(place is not None and low_x_m < place.x_m < high_x_m for place in drawn)
 
 
+SQUARE = np.array([[0.0, 0.0, 1.0, 0.0], [1.0, 0.0, 1.0, 1.0], [1.0, 1.0, 0.0, 1.0], [0.0, 1.0, 0.0, 0.0]])
+
+
+@pytest.mark.parametrize(
+    ("side_m", "turn_rad", "shed_m", "inside_m"),
+    [(8.0, 0.4, 0.0, 8.0), (8.0, 0.0, 0.0, 8.0), (0.0, 0.0, 3.0, 0.0), (18.5, 0.0, 3.0, 18.5)],
+)
+def test_starts_are_drawn_inside_of_a_house_whatever_its_yard(
+    side_m: float, turn_rad: float, shed_m: float, inside_m: float
+) -> None:
+    """On a frame of 20 m the floor outside of a house of 8 m was the largest, and teams patrolled around it.
+
+    A shed in a yard is none: there they begin in the yard.
+    """
+    c, s = math.cos(turn_rad), math.sin(turn_rad)
+    turned = np.kron(np.eye(2), np.array([[c, -s], [s, c]]))
+    house = (side_m * (SQUARE - 0.5)) @ turned.T + 10.0
+    walls = np.concatenate([house] * (side_m > 0.0) + [shed_m * SQUARE + 12.0] * (shed_m > 0.0))
+    chart = WorldMap(
+        "yard",
+        (0.0, 0.0, 20.0, 20.0),
+        geometry=SegmentMap(walls, np.zeros((0, 3)), (0.0, 0.0, 20.0, 20.0)),
+    )
+    floor, rng = OpenFloor(chart, 0.4, None), np.random.default_rng(0)
+    for _ in range(40):
+        place = floor.draw(rng)
+        assert place is not None
+        across, along = turned[:2, :2].T @ [place.x_m - 10.0, place.y_m - 10.0]
+        assert (max(abs(across), abs(along)) < 0.5 * inside_m) == (inside_m > 0.0)
+        assert not (12.0 < place.x_m < 12.0 + shed_m and 12.0 < place.y_m < 12.0 + shed_m)
+
+
+@pytest.mark.parametrize("open_end", [True, False])
+def test_a_hall_that_the_maps_edge_cuts_off_is_no_outside(open_end: bool) -> None:
+    """A room of a fifth of its size beside it is not meant, though walls shut that in."""
+    pieces = np.zeros((100, 220), np.int64)
+    pieces[1:99, 0 if open_end else 1 : 150], pieces[1:60, 160:200] = 1, 2
+    assert meant_piece(pieces) == 1
+    assert meant_piece(np.zeros((3, 3), np.int64)) == 0
+
+
 def test_places_are_drawn_as_if_one_by_one_however_many_are_thrown_away() -> None:
     floor, rng, other = OpenFloor(WORLD, 2.3, None), np.random.default_rng(5), np.random.default_rng(5)
     place = floor.draw(rng)
@@ -84,7 +127,7 @@ def test_a_floor_that_is_full_is_found_so_by_arrays(monkeypatch: pytest.MonkeyPa
             Counted.calls += 1
             return super().uniform(*given, **named)
 
-    monkeypatch.setattr(places, "room_m", lambda *_: pytest.fail("nobody fits 20 m from the middle"))
+    monkeypatch.setattr(open_floor, "room_m", lambda *_: pytest.fail("nobody fits 20 m from the middle"))
     rng = Counted(np.random.PCG64(0))
     assert OpenFloor(WORLD, 0.4, None).draw(rng, [(PoseConfig(x_m=4.0, y_m=2.0), 20.0)]) is None
     assert 0 < Counted.calls <= 1000

@@ -17,6 +17,7 @@ from pilotage.kernels.grids.theta import line_of_sight
 from pilotage.kernels.grids.travel_cost import some_travel_costs, travel_costs
 from pilotage.kernels.patrol.pull import pulled_corners
 from pilotage.maps.distance_field import DistanceField
+from pilotage.maps.pieces import meant_piece
 from pilotage.maps.world_map import WorldMap
 
 MOST_CELLS = 400_000
@@ -102,7 +103,7 @@ class Floor:
         cell_m
             Side of a cell, coarser where the map is too large for it.
         inside_xy_m
-            A place on the floor that is meant; else the largest piece where the robot fits.
+            A place on the floor that is meant; else as of ``meant_piece``.
         exact
             Distances are measured in the cells' middles where the walls are known; between nodes of the map's
             field, farther apart than passages are wide, they are some centimetres off.
@@ -155,10 +156,9 @@ class Floor:
             row, column = floor.nearest_cell(np.array(inside_xy_m), "start")
             piece = pieces[row, column]
         else:
-            sizes = np.bincount(pieces.ravel())
-            if len(sizes) < 2:
+            piece = meant_piece(pieces)
+            if not piece:
                 raise InputError(f"{where}: expected floor for a robot of radius {radius_m:g} m, found none")
-            piece = 1 + int(np.argmax(sizes[1:]))
         return Floor((xmin, ymin), cell_m, radius_m, clearance, pieces == piece)
 
     def roomy(self, spare_m: float, reach_m: float, inside_xy_m: tuple[float, float]) -> Floor:

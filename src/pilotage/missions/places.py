@@ -34,7 +34,7 @@ class GoalConfig(Config):
 class RandomPlace(Config):
     """A pose drawn from the run's seed among those that a body can drive to from ``world.start``.
 
-    Without a ``start`` among those of the map's largest floor.
+    Without a ``start`` among those of the floor that is meant: the largest that does not lie outside.
     """
 
     clearance_m: Positive = 0.6

@@ -83,8 +83,8 @@ Landmarks = Annotated[
 class WorldConfig(Config):
     """The map, start and goal, and what should not be there.
 
-    With ``random_start`` the run begins elsewhere than at ``start``; with no ``start``, on the largest floor.
-    Without both it begins where the sheet says, or in its middle. Landmarks in a table take the
+    With ``random_start`` the run begins elsewhere than at ``start``; with no ``start``, on the floor that is
+    meant. Without both it begins where the sheet says, or in its middle. Landmarks in a table take the
     place of those that the map has.
     """
 

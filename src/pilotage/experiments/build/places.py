@@ -4,21 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import cached_property
-from typing import Any
 
 import numpy as np
-import scipy
 
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.errors import InputError
 from pilotage.core.random import RandomStreams
-from pilotage.core.types import BoolArray, FloatArray, Pose2
+from pilotage.core.types import Pose2
+from pilotage.experiments.build.open_floor import OpenFloor, random_pose, room_m
 from pilotage.experiments.build.robots import footprint_of
-from pilotage.kernels.grids.blocked_distance import distance_to_blocked
-from pilotage.maps.distance_field import DistanceField
-from pilotage.maps.floor import SNAP_M, Floor
-from pilotage.maps.known_maps import OncePerMap
 from pilotage.maps.occupancy_grid import UNKNOWN
 from pilotage.maps.world_map import WorldMap
 from pilotage.missions.mission import Mission
@@ -26,15 +20,8 @@ from pilotage.missions.places import Kidnap, PoseConfig
 from pilotage.missions.robot import RobotConfig
 from pilotage.models.footprint import Footprint
 
-GRID_M = 0.1
-_FIELDS: OncePerMap[DistanceField] = OncePerMap()
-DRAWS_AT_ONCE = 1000
-MAX_DRAWS = 100_000
 ROOM_M = 0.1
-"""Of a starting place that is drawn, beyond the body,"""
-EASY_M, STEP_M = 0.1, 0.15
-"""and of the passages from it to the others besides, where there are such: a planner's nodes lie apart, and a
-gap between them that the body just fits through may have none. A place so near to that floor is of it."""
+"""Of a starting place that is drawn, beyond the body."""
 
 
 def start_pose(mission: Mission, index: int, chart: WorldMap) -> PoseConfig:
@@ -64,8 +51,8 @@ def start_pose(mission: Mission, index: int, chart: WorldMap) -> PoseConfig:
 def settle_places(mission: Mission, chart: WorldMap, about: tuple[float, float] | None = None) -> Mission:
     """Return the mission with all its places known, so that it can be recorded and run again as it is.
 
-    A random start without ``world.start`` is drawn on the largest floor. A team's starts are drawn on the
-    floor of the place that the task is ``about``, if it is about one.
+    A random start without ``world.start`` is drawn on the floor that is meant. A team's starts are drawn on
+    the floor of the place that the task is ``about``, if it is about one.
     """
     if mission.team.size is not None:
         mission = _with_drawn_starts(mission, chart, about)
@@ -107,7 +94,8 @@ def _started(mission: Mission, starts: Sequence[PoseConfig]) -> Mission:
 def _with_drawn_starts(mission: Mission, chart: WorldMap, about: tuple[float, float] | None) -> Mission:
     """The mission with a place for every robot that has none: drawn in turn, apart from those before.
 
-    They are places that ``world.start`` is connected to, or what the task is about, or on the largest floor.
+    They are places that ``world.start`` is connected to, or what the task is about, or on the floor that is
+    meant.
 
     Raises
     ------
@@ -202,18 +190,6 @@ def _check_free(where: str, x_m: float, y_m: float, chart: WorldMap) -> None:
     raise InputError(f"{where}: expected a free cell, found {found} at ({x_m:g}, {y_m:g}); {remedy}")
 
 
-def room_m(chart: WorldMap, x_m: float, y_m: float, asked_m: float) -> float:
-    """Distance from a point to the nearest wall or blocked cell; beyond ``asked_m`` it may be told short."""
-    if chart.geometry is not None:
-        return chart.geometry.distance_m(x_m, y_m)
-    if chart.grid is None:
-        return math.inf
-    grid = chart.grid
-    reach = math.ceil(asked_m / grid.resolution_m) + 2
-    places = grid.places_at(np.array([[x_m, y_m]]))
-    return float(distance_to_blocked(places, grid.blocked(), reach)[0]) * grid.resolution_m
-
-
 def pose_of(place: PoseConfig) -> Pose2:
     """The pose that a mission file says."""
     return Pose2(place.x_m, place.y_m, wrap_to_pi(place.theta_rad))
@@ -221,148 +197,6 @@ def pose_of(place: PoseConfig) -> Pose2:
 
 def _carried(kidnap: Kidnap, chart: WorldMap, near: PoseConfig | None, rng: np.random.Generator) -> Kidnap:
     return kidnap.model_copy(update={"to": random_pose(chart, near, kidnap.clearance_m, rng)})
-
-
-def random_pose(
-    chart: WorldMap, reachable_from: PoseConfig | None, clearance_m: float, rng: np.random.Generator
-) -> PoseConfig:
-    """Draw a pose, uniform over the floor that is connected to a place at a clearance, or the largest one.
-
-    Raises
-    ------
-    InputError
-        Where the place itself has less clearance, or nothing is found.
-    """
-    found = OpenFloor(chart, clearance_m, reachable_from).draw(rng)
-    if found is None:
-        raise InputError(f"random place: found none with {clearance_m:g} m of clearance; ask for less")
-    return found
-
-
-class OpenFloor:
-    """The floor that is connected to a place at a clearance; without a place the largest one.
-
-    Parameters
-    ----------
-    about
-        Without a place: the floor nearest to this one, which may be beside a wall or in one. Whether anybody
-        can get there its task tells, in its own words.
-
-    Raises
-    ------
-    InputError
-        Where the place itself has less clearance.
-    """
-
-    def __init__(
-        self,
-        chart: WorldMap,
-        clearance_m: float,
-        reachable_from: PoseConfig | None,
-        about: tuple[float, float] | None = None,
-    ) -> None:
-        self._chart, self._clearance_m = chart, clearance_m
-        self._field = chart.field if chart.geometry is None else _finer_field(chart)
-        self._regions, count = scipy.ndimage.label(self._field.distance_m >= clearance_m)
-        if reachable_from is None:
-            sizes = np.bincount(self._regions.ravel(), minlength=2)
-            largest = int(np.argmax(sizes[1:])) + 1 if count else 0
-            self._home = largest if about is None else self._nearest_region(*about) or largest
-            return
-        self._home = self._region(reachable_from.x_m, reachable_from.y_m)
-        if self._home == 0:
-            raise InputError(
-                f"world.start: expected {clearance_m:g} m to the nearest wall, from where random places are "
-                f"reached, found less at ({reachable_from.x_m:g}, {reachable_from.y_m:g})"
-            )
-
-    @cached_property
-    def easy(self) -> BoolArray:
-        """(rows, columns) of it what is beside its largest part whose passages have ``EASY_M`` more room."""
-        home = self._regions == self._home
-        pieces, count = scipy.ndimage.label(home & (self._field.distance_m >= self._clearance_m + EASY_M))
-        if not count:
-            return np.asarray(home)
-        largest = pieces == 1 + int(np.argmax(np.bincount(pieces.ravel())[1:]))
-        steps = math.ceil(STEP_M / self._field.resolution_m)
-        return np.asarray(home & scipy.ndimage.binary_dilation(largest, iterations=steps))
-
-    def in_cells(self, first: PoseConfig | None) -> BoolArray:
-        """(rows, columns) of it what a task's floor, in cells, reaches from the first who was placed."""
-        home = np.asarray(self._regions == self._home)
-        inside = None if first is None else (first.x_m, first.y_m)
-        try:
-            cells = Floor.of(self._chart, self._clearance_m, inside_xy_m=inside)
-        except InputError:
-            return home
-        axes = []
-        for count, origin_m, low_m, cell_count in zip(
-            home.shape,
-            self._field.origin_xy_m[::-1],
-            cells.origin_xy_m[::-1],
-            cells.reachable.shape,
-            strict=True,
-        ):
-            place_m = origin_m + self._field.resolution_m * np.arange(count)
-            axes.append(
-                np.clip(np.floor((place_m - low_m) / cells.cell_m).astype(np.int64), 0, cell_count - 1)
-            )
-        return np.asarray(home & cells.reachable[np.ix_(*axes)])
-
-    def _region(self, x: float, y: float) -> int:
-        return int(self._at_nodes(self._regions, np.array([[x, y]]))[0])
-
-    def _nearest_region(self, x: float, y: float) -> int:
-        """That of the nearest node that has room, no farther than a task takes a place to be; else 0."""
-        low_m = np.asarray(self._field.origin_xy_m)
-        columns, rows = (
-            np.flatnonzero(np.abs(origin_m + self._field.resolution_m * np.arange(count) - at) <= SNAP_M)
-            for origin_m, count, at in zip(low_m, self._regions.shape[::-1], (x, y), strict=True)
-        )
-        near = self._regions[np.ix_(rows, columns)]
-        away_m = np.hypot(
-            *np.meshgrid(
-                low_m[0] + self._field.resolution_m * columns - x,
-                low_m[1] + self._field.resolution_m * rows - y,
-            )
-        )
-        away_m = np.where((near > 0) & (away_m <= SNAP_M), away_m, np.inf)
-        if not np.isfinite(away_m).any():
-            return 0
-        return int(near.ravel()[np.argmin(away_m)])
-
-    def _at_nodes(self, nodes: np.ndarray[Any, Any], points_m: FloatArray) -> np.ndarray[Any, Any]:
-        """(N,) what the node nearest to each place has; zero beyond the map."""
-        at = np.rint((points_m - np.asarray(self._field.origin_xy_m)) / self._field.resolution_m)
-        at = at.astype(np.int64)[:, ::-1]
-        inside = np.all((at >= 0) & (at < nodes.shape), axis=1)
-        row, column = np.where(inside[:, None], at, 0).T
-        return np.asarray(nodes[row, column] * inside)
-
-    def draw(
-        self,
-        rng: np.random.Generator,
-        apart_from: Sequence[tuple[PoseConfig, float]] = (),
-        part: BoolArray | None = None,
-    ) -> PoseConfig | None:
-        """Draw a pose on a part of it, so far from each of some others; None where nothing is found."""
-        xmin, ymin, xmax, ymax = self._chart.bounds_m
-        low, high = [xmin, ymin, -math.pi], [xmax, ymax, math.pi]
-        wanted = self._regions == self._home if part is None else part & (self._regions == self._home)
-        for _ in range(MAX_DRAWS // DRAWS_AT_ONCE if self._home else 0):
-            before = rng.bit_generator.state
-            drawn = rng.uniform(low, high, (DRAWS_AT_ONCE, 3))
-            fit = self._at_nodes(wanted, drawn[:, :2])
-            for place, spacing_m in apart_from:
-                fit &= np.hypot(drawn[:, 0] - place.x_m, drawn[:, 1] - place.y_m) >= spacing_m
-            for index in np.flatnonzero(fit).tolist():
-                x, y, theta = drawn[index].tolist()
-                if room_m(self._chart, x, y, self._clearance_m) >= self._clearance_m:
-                    # What is drawn next goes on behind this one, as if they had been drawn one by one.
-                    rng.bit_generator.state = before
-                    rng.uniform(low, high, (index + 1, 3))
-                    return PoseConfig(x_m=x, y_m=y, theta_rad=theta)
-        return None
 
 
 def check_landmarks(chart: WorldMap) -> None:
@@ -383,8 +217,3 @@ def check_landmarks(chart: WorldMap) -> None:
             f"world.landmarks: expected landmarks that can be seen, found all {len(points)} inside walls; "
             "put them onto free cells beside walls"
         )
-
-
-def _finer_field(chart: WorldMap) -> DistanceField:
-    """Distances to walls, nearer to each other than on the map's own field."""
-    return _FIELDS.get(chart, GRID_M, lambda: DistanceField.from_map(chart.walls, GRID_M))
