@@ -237,6 +237,14 @@ class TestRosMaps:
         )
         assert RosMap(file, np.array([[0, 50, 142, 220, 254]], np.uint8)).grid.cells.tolist() == [expected]
 
+    def test_one_threshold_for_both_leaves_nothing_unknown(self) -> None:
+        """A published map has it, and its server takes it."""
+        file = RosMapFile(
+            image="a.pgm", resolution=1.0, origin=(0, 0, 0), free_thresh=0.196, occupied_thresh=0.196
+        )
+        pixels = np.array([[0, 100, 230, 254]], np.uint8)
+        assert RosMap(file, pixels).grid.cells.tolist() == [[OCCUPIED, OCCUPIED, FREE, FREE]]
+
     @pytest.mark.parametrize(("grey", "expected"), [(205, UNKNOWN), (206, FREE)])
     def test_what_map_saver_wrote_as_unknown_is(self, grey: int, expected: int) -> None:
         """By the threshold that Navigation 2 writes both are free: robots patrolled around buildings."""

@@ -155,7 +155,7 @@ def test_a_ros_map_without_its_image_says_so(tmp_path: Path) -> None:
         (
             "a.yaml",
             "image: a.pgm\nresolution: 1\norigin: [0, 0, 0]\nfree_thresh: 0.7\noccupied_thresh: 0.6\n",
-            "expected free_thresh below occupied_thresh 0.6, found 0.7",
+            "expected free_thresh at most occupied_thresh 0.6, found 0.7",
         ),
     ],
 )

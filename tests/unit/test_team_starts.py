@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 
 from pilotage.core.errors import InputError
+from pilotage.core.types import Pose2
 from pilotage.experiments.build import open_floor
 from pilotage.experiments.build.charts import chart_of
 from pilotage.experiments.build.open_floor import OpenFloor
 from pilotage.experiments.build.places import settle_places
 from pilotage.experiments.mission import load_mission
+from pilotage.maps.occupancy_grid import FREE, OCCUPIED, OccupancyGrid
 from pilotage.maps.pieces import meant_piece
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.maps.world_map import WorldMap
@@ -102,6 +104,19 @@ def test_a_hall_that_the_maps_edge_cuts_off_is_no_outside(open_end: bool) -> Non
     pieces[1:99, 0 if open_end else 1 : 150], pieces[1:60, 160:200] = 1, 2
     assert meant_piece(pieces) == 1
     assert meant_piece(np.zeros((3, 3), np.int64)) == 0
+
+
+def test_a_map_that_a_robot_made_is_of_where_it_began() -> None:
+    """A race track is a twentieth of the white around it; the map's origin is on its start line."""
+    cells = np.full((200, 200), OCCUPIED, np.int8)
+    cells[:95], cells[97:103, 20:180], cells[105:] = FREE, FREE, FREE
+    for origin, track in ((Pose2(-10.0, -10.0, 0.0), True), (Pose2(1.0, 1.0, 0.0), False)):
+        grid = OccupancyGrid(cells, 0.1, origin)
+        x, y = origin.x_m, origin.y_m
+        chart = WorldMap("track", (x, y, x + 20.0, y + 20.0), grid=grid)
+        place = OpenFloor(chart, 0.2, None).draw(np.random.default_rng(0))
+        assert place is not None
+        assert (abs(place.y_m - origin.y_m - 10.0) < 0.3) == track
 
 
 def test_places_are_drawn_as_if_one_by_one_however_many_are_thrown_away() -> None:

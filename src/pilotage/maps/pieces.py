@@ -13,8 +13,11 @@ LEAST_SHARE = 0.1
 """What is smaller than this share of the largest piece is a shed in a yard rather than a house."""
 
 
-def meant_piece(pieces: npt.NDArray[np.integer]) -> int:
+def meant_piece(pieces: npt.NDArray[np.integer], begun_on: int = 0) -> int:
     """The piece, of those that cells (rows, columns) are labelled with from 1 on; 0 where there is none.
+
+    A robot's own map has its origin where it began to drive: the piece that it ``begun_on`` is meant, be it
+    small, where it does not lie outside.
 
     A plan drawn askew or with a margin has floor around its walls as well, often more than between them: it
     runs along the map's edge. A hall or a corridor that the edge cuts off does so for less than
@@ -27,5 +30,8 @@ def meant_piece(pieces: npt.NDArray[np.integer]) -> int:
         return 0
     edge = np.concatenate([pieces[0], pieces[-1], pieces[1:-1, 0], pieces[1:-1, -1]])
     along = np.bincount(edge, minlength=len(sizes))
-    inside = (along <= OUTSIDE_RATIO * np.sqrt(sizes)) & (sizes >= math.ceil(LEAST_SHARE * sizes.max()))
+    inside = along <= OUTSIDE_RATIO * np.sqrt(sizes)
+    if begun_on and inside[begun_on]:
+        return begun_on
+    inside &= sizes >= math.ceil(LEAST_SHARE * sizes.max())
     return int(np.argmax(np.where(inside, sizes, 0) if inside.any() else sizes))

@@ -52,9 +52,9 @@ class RosMapFile(Config):
 
     @model_validator(mode="after")
     def _thresholds_in_order(self) -> RosMapFile:
-        if not self.free_thresh < self.occupied_thresh:
+        if not self.free_thresh <= self.occupied_thresh:
             free, occupied = self.free_thresh, self.occupied_thresh
-            raise ValueError(f"expected free_thresh below occupied_thresh {occupied:g}, found {free:g}")
+            raise ValueError(f"expected free_thresh at most occupied_thresh {occupied:g}, found {free:g}")
         return self
 
 

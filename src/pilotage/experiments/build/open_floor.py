@@ -72,7 +72,7 @@ class OpenFloor:
         self._field = chart.field if chart.geometry is None else _finer_field(chart)
         self._regions, _ = scipy.ndimage.label(self._field.distance_m >= clearance_m)
         if reachable_from is None:
-            meant = meant_piece(self._regions)
+            meant = meant_piece(self._regions, self._region(0.0, 0.0) if chart.geometry is None else 0)
             self._home = meant if about is None else self._nearest_region(*about) or meant
             return
         self._home = self._region(reachable_from.x_m, reachable_from.y_m)
