@@ -25,8 +25,8 @@ for _library in ("OPENBLAS", "OMP", "MKL"):
 # numba would colour each word of what its overloads say where they do not apply; nobody reads most of it.
 os.environ["NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING"] = "1"
 
-# Where bytecode may not lie beside the source, it lies in pytest's own folder: else each worker and each of the
-# processes that tests start would compile all of pilotage from its text, at every run anew.
+# Where bytecode may not lie beside the source, it lies in pytest's own folder: else each worker and each of
+# the processes that tests start would compile all of pilotage and its libraries, at every run anew.
 if os.environ.pop("PYTHONDONTWRITEBYTECODE", "") and "PYTHONPYCACHEPREFIX" not in os.environ:
     os.environ["PYTHONPYCACHEPREFIX"] = str(Path(__file__).parents[1] / ".pytest_cache" / "bytecode")
     sys.pycache_prefix, sys.dont_write_bytecode = os.environ["PYTHONPYCACHEPREFIX"], False
