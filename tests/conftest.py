@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import atexit
 import gc
 import os
-import shutil
 import signal
 import sys
-import tempfile
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -27,12 +25,11 @@ for _library in ("OPENBLAS", "OMP", "MKL"):
 # numba would colour each word of what its overloads say where they do not apply; nobody reads most of it.
 os.environ["NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING"] = "1"
 
-# Where bytecode may not lie beside the source, it lies in a folder of this run: else each of the processes
-# that tests start would compile all of pilotage from its text.
+# Where bytecode may not lie beside the source, it lies in pytest's own folder: else each worker and each of
+# the processes that tests start would compile all of pilotage and its libraries, at every run anew.
 if os.environ.pop("PYTHONDONTWRITEBYTECODE", "") and "PYTHONPYCACHEPREFIX" not in os.environ:
-    _bytecode = tempfile.mkdtemp(prefix="pilotage-bytecode-")
-    atexit.register(shutil.rmtree, _bytecode, ignore_errors=True)
-    os.environ["PYTHONPYCACHEPREFIX"] = _bytecode
+    os.environ["PYTHONPYCACHEPREFIX"] = str(Path(__file__).parents[1] / ".pytest_cache" / "bytecode")
+    sys.pycache_prefix, sys.dont_write_bytecode = os.environ["PYTHONPYCACHEPREFIX"], False
 
 # A shell's background job ignores Ctrl-C, and so would all that tests start; those of Ctrl-C need it heard.
 signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -7,6 +7,7 @@ Seeds are fixed; a right filter's mean NEES over 80 independent drives leaves th
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -36,8 +37,9 @@ BY_ODOMETRY: tuple[tuple[str, dict[str, Any]], ...] = (
 )
 
 
+@cache
 def drive(seed: int) -> tuple[list[OdometryIncrement], Pose2]:
-    """What the odometry said of a weave to the left and back, and where it ended."""
+    """What the odometry said of a weave to the left and back, and where it ended; driven once for all."""
     wheels = {name: config for name, config in sensors().items() if isinstance(config, WheelOdometryConfig)}
     spec = worlds.robot(wheels, OmnidirectionalConfig(), start=START, seed=seed)
     sim = worlds.alone(spec)
