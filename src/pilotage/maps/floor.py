@@ -17,6 +17,7 @@ from pilotage.kernels.grids.theta import line_of_sight
 from pilotage.kernels.grids.travel_cost import some_travel_costs, travel_costs
 from pilotage.kernels.patrol.pull import pulled_corners
 from pilotage.maps.distance_field import DistanceField
+from pilotage.maps.outside import outside_building
 from pilotage.maps.world_map import WorldMap
 
 MOST_CELLS = 400_000
@@ -102,7 +103,8 @@ class Floor:
         cell_m
             Side of a cell, coarser where the map is too large for it.
         inside_xy_m
-            A place on the floor that is meant; else the largest piece where the robot fits.
+            A place on the floor that is meant; else the largest piece where the robot fits, of a building
+            that fills its map none outside.
         exact
             Distances are measured in the cells' middles where the walls are known; between nodes of the map's
             field, farther apart than passages are wide, they are some centimetres off.
@@ -113,7 +115,14 @@ class Floor:
             Where the robot fits nowhere, or not at the place.
         """
         return Floor.of_field(
-            world.field, world.bounds_m, radius_m, cell_m, inside_xy_m, f"map '{world.name}'", exact=exact
+            world.field,
+            world.bounds_m,
+            radius_m,
+            cell_m,
+            inside_xy_m,
+            f"map '{world.name}'",
+            exact=exact,
+            building=world.geometry is not None,
         )
 
     @staticmethod
@@ -127,8 +136,12 @@ class Floor:
         *,
         exact: bool = False,
         most_cells: int = MOST_CELLS,
+        building: bool = False,
     ) -> Floor:
-        """Lay so many cells at most over distances to walls; as ``of``."""
+        """Lay so many cells at most over distances to walls; as ``of``.
+
+        Of a ``building``, a map of walls, what lies outside is no floor for who is inside.
+        """
         xmin, ymin, xmax, ymax = bounds_m
         cell_m = cell_side_m(bounds_m, cell_m, most_cells)
         rows, columns = math.ceil((ymax - ymin) / cell_m), math.ceil((xmax - xmin) / cell_m)
@@ -149,11 +162,20 @@ class Floor:
         # What lies past the bounds is no floor, though the field calls it as near as their edge.
         clearance[:, x > xmax] = clearance[y > ymax, :] = -1.0
         fits = clearance >= radius_m
-        pieces, _ = scipy.ndimage.label(fits)
-        floor = Floor((xmin, ymin), cell_m, radius_m, clearance, fits)
+        home = None
         if inside_xy_m is not None:
-            row, column = floor.nearest_cell(np.array(inside_xy_m), "start")
-            piece = pieces[row, column]
+            floor = Floor((xmin, ymin), cell_m, radius_m, clearance, fits)
+            home = floor.nearest_cell(np.array(inside_xy_m), "start")
+        if building:
+            # Cells nearer to thin walls may be joined through them.
+            pieces, _ = scipy.ndimage.label(clearance >= max(radius_m, THIN_CELLS * cell_m))
+            outside = outside_building(pieces, clearance, cell_m)
+            if home is None or not outside[home]:
+                clearance[outside] = -1.0
+                fits &= ~outside
+        pieces, _ = scipy.ndimage.label(fits)
+        if home is not None:
+            piece = pieces[home]
         else:
             sizes = np.bincount(pieces.ravel())
             if len(sizes) < 2:
@@ -237,6 +259,8 @@ class Floor:
         if not (0.0 <= x_m - x0 <= columns * self.cell_m and 0.0 <= y_m - y0 <= rows * self.cell_m):
             return "one beyond the map"
         clearance_m = float(self.clearance_m[self.cell_of(np.array([x_m, y_m]))])
+        if clearance_m < 0.0:
+            return "one in what is solid or outside the building"
         apart = ", but no passage so wide leads there; take a smaller robot"
         return f"{clearance_m:.2f} m" + apart * (clearance_m >= self.radius_m)
 

@@ -20,6 +20,7 @@ from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.floor import SNAP_M, Floor
 from pilotage.maps.known_maps import OncePerMap
 from pilotage.maps.occupancy_grid import UNKNOWN
+from pilotage.maps.outside import outside_building
 from pilotage.maps.world_map import WorldMap
 from pilotage.missions.mission import Mission
 from pilotage.missions.places import Kidnap, PoseConfig
@@ -240,7 +241,7 @@ def random_pose(
 
 
 class OpenFloor:
-    """The floor that is connected to a place at a clearance; without a place the largest one.
+    """The floor that is connected to a place at a clearance; without a place the largest one of the building.
 
     Parameters
     ----------
@@ -265,7 +266,11 @@ class OpenFloor:
         self._field = chart.field if chart.geometry is None else _finer_field(chart)
         self._regions, count = scipy.ndimage.label(self._field.distance_m >= clearance_m)
         if reachable_from is None:
-            sizes = np.bincount(self._regions.ravel(), minlength=2)
+            inside = self._regions
+            if chart.geometry is not None:
+                away_m, spacing_m = self._field.distance_m, self._field.resolution_m
+                inside = np.where(outside_building(inside, away_m, spacing_m), 0, inside)
+            sizes = np.bincount(inside.ravel(), minlength=2)
             largest = int(np.argmax(sizes[1:])) + 1 if count else 0
             self._home = largest if about is None else self._nearest_region(*about) or largest
             return
