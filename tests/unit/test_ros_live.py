@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from pilotage.bridges.ros import messages as ros
 from pilotage.bridges.ros.driving import _increment, _ranges
 from pilotage.bridges.ros.serving import moved
 from pilotage.cli.main import main
+from pilotage.core.angles import wrap_to_pi
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import OdometryIncrement
 
@@ -140,6 +142,17 @@ def test_scans_of_other_beams_are_taken_by_the_nearest() -> None:
     assert _ranges(Message, sheet).tolist() == [min(10.0 * k, 150.0) for k in range(21)]
     wide = LidarConfig(beams=3, field_of_view_rad=4.0, max_range_m=150.0)
     assert _ranges(Message, wide).tolist() == [150.0, 100.0, 150.0]
+
+
+@pytest.mark.parametrize(("first_rad", "step_deg"), [(0.0, 1.0), (2.0 * math.pi, -1.0), (-math.pi, 1.0)])
+def test_a_scanner_that_looks_all_around_may_begin_anywhere(first_rad: float, step_deg: float) -> None:
+    """Of one that counts from 0 to 2 pi half the beams read as far as the data sheet says: nothing there."""
+
+    step_rad = math.radians(step_deg)
+    ranges = [1.0 + abs(wrap_to_pi(first_rad + step_rad * k)) for k in range(360)]
+    message = SimpleNamespace(angle_min=first_rad, angle_increment=step_rad, ranges=ranges)
+    sheet = LidarConfig(beams=72, field_of_view_rad=2.0 * math.pi)
+    assert _ranges(message, sheet) == pytest.approx(1.0 + np.abs(sheet.beam_angles_rad()))
 
 
 def test_times_are_whole_nanoseconds() -> None:
