@@ -17,10 +17,11 @@ from pilotage.bridges.ros.run_messages import RunMessages, Stamped
 from pilotage.cli.app import dispatch
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, Pose2
-from pilotage.experiments.recordings.bag_drive import _part_var
+from pilotage.experiments.recordings.bag_drive import _part_var, _scans, _sheet
 from pilotage.experiments.recordings.run_scans import read_run_scans
 from pilotage.logs.bag_kinds import LANDMARKS, POSES
 from pilotage.logs.bag_series import read_series
+from pilotage.logs.laser_log import RawScan, assemble
 from pilotage.logs.laser_recordings import read_laser_log
 from pilotage.maps.ros_map import RosMap, write_ros_map
 from support.command_bags import commanded
@@ -145,6 +146,20 @@ def test_which_part_of_a_slow_increment_is_whose_is_unsure_where_the_robot_turns
     told_rad = float(np.sqrt(var[turning, 2].mean()))
     assert np.diff(off_rad)[turning[1:]].std() < told_rad < 3.0 * np.abs(off_rad).max()
     assert (_part_var(clock, driven(clock), slow_s) == 0.0).all(), "faster than the steps"
+
+
+@pytest.mark.parametrize(("first_rad", "beams"), [(-1.2, 300), (-1.8, 300), (-1.5, 301), (0.0, 620)])
+@pytest.mark.parametrize("mount_rad", [math.pi, -math.pi, 2.0, 0.0])
+def test_a_scanner_may_look_back(first_rad: float, beams: int, mount_rad: float) -> None:
+    """Its middle beam beyond half a turn of the robot's heading, no beam of it was taken, without a word."""
+    ranges_m = np.linspace(1.0, 2.0, beams)
+    raw = [RawScan(float(k), ranges_m, first_rad, 0.01, 0.1, 9.0) for k in range(2)]
+    nothing = np.zeros(0)
+    laser = assemble("back", raw, Pose2(-0.2, 0.0, mount_rad), False, nothing, nothing.reshape(0, 3))
+    sheet = _sheet(laser)
+    assert _scans(laser, sheet) == pytest.approx(np.tile(ranges_m, (2, 1)))
+    seen_rad = sheet.mount.theta_rad + sheet.beam_angles_rad()[0]
+    assert math.remainder(seen_rad - mount_rad - first_rad, 2.0 * math.pi) == pytest.approx(0.0, abs=1e-9)
 
 
 def test_odometry_that_was_recorded_as_transforms(table: Path, tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from pilotage.bridges.ros import messages as ros
 from pilotage.bridges.ros.driving import _increment, _ranges
 from pilotage.bridges.ros.serving import moved
 from pilotage.cli.main import main
+from pilotage.core.angles import wrap_to_pi
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import OdometryIncrement
 
@@ -131,15 +133,39 @@ def test_increments_survive_the_way_through_poses() -> None:
         assert (back.distance_m, back.angle_rad, back.lateral_m) == pytest.approx(tuple(values))
 
 
+def _scan(
+    first_rad: float, step_rad: float, ranges: list[float], range_min: float = 0.1, range_max: float = 8.0
+) -> SimpleNamespace:
+    limits = {"range_min": range_min, "range_max": range_max}
+    return SimpleNamespace(angle_min=first_rad, angle_increment=step_rad, ranges=ranges, **limits)
+
+
 def test_scans_of_other_beams_are_taken_by_the_nearest() -> None:
-    class Message:
-        angle_min, angle_increment = -1.0, 0.01
-        ranges = [float(k) for k in range(201)]  # noqa: RUF012
+    ranges = [float(k) for k in range(1, 202)]
+    message = _scan(-1.0, 0.01, ranges, range_max=300.0)
 
     sheet = LidarConfig(beams=21, field_of_view_rad=2.0, max_range_m=150.0)
-    assert _ranges(Message, sheet).tolist() == [min(10.0 * k, 150.0) for k in range(21)]
+    assert _ranges(message, sheet).tolist() == [min(1.0 + 10.0 * k, 150.0) for k in range(21)]
     wide = LidarConfig(beams=3, field_of_view_rad=4.0, max_range_m=150.0)
-    assert _ranges(Message, wide).tolist() == [150.0, 100.0, 150.0]
+    assert _ranges(message, wide).tolist() == [150.0, 101.0, 150.0]
+
+
+@pytest.mark.parametrize(("first_rad", "step_deg"), [(0.0, 1.0), (2.0 * math.pi, -1.0), (-math.pi, 1.0)])
+def test_a_scanner_that_looks_all_around_may_begin_anywhere(first_rad: float, step_deg: float) -> None:
+    """Of one that counts from 0 to 2 pi half the beams read as far as the data sheet says: nothing there."""
+
+    step_rad = math.radians(step_deg)
+    ranges = [1.0 + abs(wrap_to_pi(first_rad + step_rad * k)) for k in range(360)]
+    message = _scan(first_rad, step_rad, ranges)
+    sheet = LidarConfig(beams=72, field_of_view_rad=2.0 * math.pi)
+    assert _ranges(message, sheet) == pytest.approx(1.0 + np.abs(sheet.beam_angles_rad()))
+
+
+def test_what_a_driver_says_of_beams_without_a_range_is_understood() -> None:
+    """A wall too near to be measured read as nothing there, and a zero for no return as a wall."""
+    sheet = LidarConfig(beams=7, field_of_view_rad=0.6, max_range_m=5.0)
+    message = _scan(-0.3, 0.1, [-math.inf, 0.0, 0.05, 3.0, 9.0, math.inf, math.nan])
+    assert _ranges(message, sheet).tolist() == [0.1, 5.0, 5.0, 3.0, 5.0, 5.0, 5.0]
 
 
 def test_times_are_whole_nanoseconds() -> None:

@@ -15,6 +15,7 @@ from pilotage.experiments.build.charts import chart_of
 from pilotage.experiments.build.open_floor import OpenFloor
 from pilotage.experiments.build.places import settle_places
 from pilotage.experiments.mission import load_mission
+from pilotage.maps.floor import Floor
 from pilotage.maps.occupancy_grid import FREE, OCCUPIED, OccupancyGrid
 from pilotage.maps.pieces import meant_piece
 from pilotage.maps.segment_map import SegmentMap
@@ -169,3 +170,47 @@ class TestLargeRobots:
             self.team("robot.footprint.radius_m=2.5", "team.size=16")
         with pytest.raises(InputError, match=r"places 30 m apart .* or for less team.spacing_m$"):
             self.team("team.spacing_m=30")
+
+
+def _map_of(walls: list[list[float]]) -> WorldMap:
+    geometry = SegmentMap.of(np.array(walls, float))
+    return WorldMap("drawn", geometry.bounds_m, geometry=geometry)
+
+
+def _ring(*corners: tuple[float, float]) -> list[list[float]]:
+    return [[*corners[k - 1], *corners[k]] for k in range(len(corners))]
+
+
+@pytest.mark.parametrize(
+    ("walls", "inside_m", "outside_m"),
+    [
+        (_ring((0, 0), (20, 0), (20, 3), (3, 3), (3, 20), (0, 20)), (1.5, 10.0), (10.0, 10.0)),
+        (_ring((0.0, 0.0), (18.36, 15.46), (15.14, 19.29), (-3.22, 3.82)), (7.57, 9.65), (16.0, 4.0)),
+    ],
+    ids=["l-shaped", "turned"],
+)
+def test_starts_are_drawn_inside_of_a_building_that_fills_little_of_its_map(
+    walls: list[list[float]], inside_m: tuple[float, float], outside_m: tuple[float, float]
+) -> None:
+    """The map's corners beyond the walls were the largest floor: a team patrolled outside."""
+    world = _map_of(walls)
+    floor, rng = OpenFloor(world, 0.4, None), np.random.default_rng(0)
+    cells = Floor.of(world, 0.3)
+    assert cells.apart_fraction == 0.0
+    assert cells.reachable[cells.cell_of(np.array(inside_m))]
+    for _ in range(40):
+        place = floor.draw(rng)
+        assert place is not None
+        assert cells.reachable[cells.cell_of(np.array([place.x_m, place.y_m]))]
+    with pytest.raises(InputError, match="outside of the building"):
+        cells.nearest_cell(np.array(outside_m))
+    # Who begins there means to be there.
+    around = Floor.of(world, 0.3, inside_xy_m=outside_m)
+    assert around.reachable[around.cell_of(np.array(outside_m))]
+
+
+def test_a_yard_that_is_open_to_one_side_is_no_building_of_the_boxes_in_it() -> None:
+    sides = [[0.0, 0.0, 20.0, 0.0], [0.0, 0.0, 0.0, 20.0], [0.0, 20.0, 20.0, 20.0]]
+    box, shed = _ring((4, 4), (7, 4), (7, 7), (4, 7)), _ring((17, 10), (20, 10), (20, 13), (17, 13))
+    cells = Floor.of(_map_of([*sides, *box, *shed]), 0.3)
+    assert cells.reachable[cells.cell_of(np.array([12.0, 12.0]))]

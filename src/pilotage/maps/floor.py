@@ -17,7 +17,7 @@ from pilotage.kernels.grids.theta import line_of_sight
 from pilotage.kernels.grids.travel_cost import some_travel_costs, travel_costs
 from pilotage.kernels.patrol.pull import pulled_corners
 from pilotage.maps.distance_field import DistanceField
-from pilotage.maps.pieces import meant_piece
+from pilotage.maps.pieces import meant_piece, outside_of
 from pilotage.maps.world_map import WorldMap
 
 MOST_CELLS = 400_000
@@ -103,7 +103,7 @@ class Floor:
         cell_m
             Side of a cell, coarser where the map is too large for it.
         inside_xy_m
-            A place on the floor that is meant; else as of ``meant_piece``.
+            A place on the floor that is meant; else as of ``meant_piece``. What lies outside of it is none.
         exact
             Distances are measured in the cells' middles where the walls are known; between nodes of the map's
             field, farther apart than passages are wide, they are some centimetres off.
@@ -113,8 +113,13 @@ class Floor:
         InputError
             Where the robot fits nowhere, or not at the place.
         """
-        return Floor.of_field(
-            world.field, world.bounds_m, radius_m, cell_m, inside_xy_m, f"map '{world.name}'", exact=exact
+        where = f"map '{world.name}'"
+        floor = Floor.of_field(world.field, world.bounds_m, radius_m, cell_m, inside_xy_m, where, exact=exact)
+        # Cells nearer to thin walls may be joined through them.
+        pieces, _ = scipy.ndimage.label(floor.clearance_m >= max(radius_m, THIN_CELLS * floor.cell_m))
+        outside = outside_of(pieces, int(np.argmax(np.bincount(pieces[floor.reachable]))))
+        return (
+            replace(floor, clearance_m=np.where(outside, -1.0, floor.clearance_m)) if outside.any() else floor
         )
 
     @staticmethod
@@ -238,6 +243,8 @@ class Floor:
             return "one beyond the map"
         clearance_m = float(self.clearance_m[self.cell_of(np.array([x_m, y_m]))])
         apart = ", but no passage so wide leads there; take a smaller robot"
+        if clearance_m < 0.0:
+            return "one in what is solid or outside of the building"
         return f"{clearance_m:.2f} m" + apart * (clearance_m >= self.radius_m)
 
     def costs_from(self, point_xy_m: FloatArray, what: str = "place") -> FloatArray:

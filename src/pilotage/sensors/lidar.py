@@ -55,7 +55,12 @@ class LidarConfig(SensorConfig):
         out = np.full(self.beams, np.nan)
         if not len(ranges_m):
             return out
-        nearest = np.rint((self.beam_angles_rad() - first_angle_rad) / (step_rad or 1.0)).astype(np.int64)
+        steps = (self.beam_angles_rad() - first_angle_rad) / (step_rad or 1.0)
+        # Directions a full turn apart are one: a scanner may count from 0 to 2 pi, or look back.
+        a_turn = 2.0 * math.pi / abs(step_rad or 1.0)
+        beside = (steps < -0.5) | (steps > len(ranges_m) - 0.5)
+        steps[beside] -= a_turn * np.floor((steps[beside] + 0.5) / a_turn)
+        nearest = np.rint(steps).astype(np.int64)
         there = (nearest >= 0) & (nearest < len(ranges_m))
         found = np.asarray(ranges_m[nearest[there]], dtype=np.float64)
         out[there] = np.where(found >= 0.0, np.minimum(found, self.max_range_m), np.nan)
