@@ -11,10 +11,11 @@ import pytest
 from pilotage.core.errors import InputError
 from pilotage.core.types import Pose2
 from pilotage.experiments.build import open_floor
-from pilotage.experiments.build.charts import chart_of
+from pilotage.experiments.build.charts import bounds_of, chart_of
 from pilotage.experiments.build.open_floor import OpenFloor
 from pilotage.experiments.build.places import settle_places
 from pilotage.experiments.mission import load_mission
+from pilotage.maps.edge import closed
 from pilotage.maps.floor import Floor
 from pilotage.maps.occupancy_grid import FREE, OCCUPIED, OccupancyGrid
 from pilotage.maps.pieces import meant_piece
@@ -103,8 +104,29 @@ def test_a_hall_that_the_maps_edge_cuts_off_is_no_outside(open_end: bool) -> Non
     """A room of a fifth of its size beside it is not meant, though walls shut that in."""
     pieces = np.zeros((100, 220), np.int64)
     pieces[1:99, 0 if open_end else 1 : 150], pieces[1:60, 160:200] = 1, 2
-    assert meant_piece(pieces) == 1
-    assert meant_piece(np.zeros((3, 3), np.int64)) == 0
+    edge = np.ones(pieces.shape, np.bool_)
+    edge[1:-1, 1:-1] = False
+    assert meant_piece(pieces, edge) == 1
+    assert meant_piece(np.zeros_like(pieces), edge) == 0
+
+
+@pytest.mark.parametrize(("end", "turn_rad"), [(False, 0.0), (True, 0.0), (True, 0.4)])
+def test_a_house_in_a_grid_is_meant_whatever_its_white_margin(end: bool, turn_rad: float) -> None:
+    """Also where a wall is put up around the grid, along which the white runs then."""
+    cells = np.full((200, 200), FREE, np.int8)
+    cells[60:140, [60, 139]] = cells[[60, 139], 60:140] = OCCUPIED
+    origin = Pose2(30.0, 5.0, turn_rad)
+    grid = OccupancyGrid(cells, 0.1, origin)
+    chart = WorldMap("house", bounds_of(grid), grid=closed(grid) if end else grid)
+    floor, rng = OpenFloor(chart, 0.4, None), np.random.default_rng(0)
+    inside = Floor.of(chart, 0.3)
+    assert inside.apart_fraction == 0.0
+    for _ in range(20):
+        place = floor.draw(rng)
+        assert place is not None
+        x, y = origin.placed(np.array([[10.0, 10.0]]))[0]
+        assert math.hypot(place.x_m - x, place.y_m - y) < 4.0 * math.sqrt(2.0)
+        assert inside.reachable[inside.cell_of(np.array([place.x_m, place.y_m]))]
 
 
 def test_a_map_that_a_robot_made_is_of_where_it_began() -> None:
@@ -113,8 +135,7 @@ def test_a_map_that_a_robot_made_is_of_where_it_began() -> None:
     cells[:95], cells[97:103, 20:180], cells[105:] = FREE, FREE, FREE
     for origin, track in ((Pose2(-10.0, -10.0, 0.0), True), (Pose2(1.0, 1.0, 0.0), False)):
         grid = OccupancyGrid(cells, 0.1, origin)
-        x, y = origin.x_m, origin.y_m
-        chart = WorldMap("track", (x, y, x + 20.0, y + 20.0), grid=grid)
+        chart = WorldMap("track", bounds_of(grid), grid=closed(grid))
         place = OpenFloor(chart, 0.2, None).draw(np.random.default_rng(0))
         assert place is not None
         assert (abs(place.y_m - origin.y_m - 10.0) < 0.3) == track

@@ -17,7 +17,7 @@ from pilotage.kernels.grids.theta import line_of_sight
 from pilotage.kernels.grids.travel_cost import some_travel_costs, travel_costs
 from pilotage.kernels.patrol.pull import pulled_corners
 from pilotage.maps.distance_field import DistanceField
-from pilotage.maps.pieces import meant_piece, outside_of
+from pilotage.maps.pieces import beside_edge, meant_piece, outside_of
 from pilotage.maps.world_map import WorldMap
 
 MOST_CELLS = 400_000
@@ -114,12 +114,8 @@ class Floor:
             Where the robot fits nowhere, or not at the place.
         """
         where = f"map '{world.name}'"
-        floor = Floor.of_field(world.field, world.bounds_m, radius_m, cell_m, inside_xy_m, where, exact=exact)
-        # Cells nearer to thin walls may be joined through them.
-        pieces, _ = scipy.ndimage.label(floor.clearance_m >= max(radius_m, THIN_CELLS * floor.cell_m))
-        outside = outside_of(pieces, int(np.argmax(np.bincount(pieces[floor.reachable]))))
-        return (
-            replace(floor, clearance_m=np.where(outside, -1.0, floor.clearance_m)) if outside.any() else floor
+        return Floor.of_field(
+            world.field, world.bounds_m, radius_m, cell_m, inside_xy_m, where, exact=exact, world=world
         )
 
     @staticmethod
@@ -133,8 +129,12 @@ class Floor:
         *,
         exact: bool = False,
         most_cells: int = MOST_CELLS,
+        world: WorldMap | None = None,
     ) -> Floor:
-        """Lay so many cells at most over distances to walls; as ``of``."""
+        """Lay so many cells at most over distances to walls; as ``of``.
+
+        Without a ``world`` nothing lies outside.
+        """
         xmin, ymin, xmax, ymax = bounds_m
         cell_m = cell_side_m(bounds_m, cell_m, most_cells)
         rows, columns = math.ceil((ymax - ymin) / cell_m), math.ceil((xmax - xmin) / cell_m)
@@ -156,15 +156,23 @@ class Floor:
         clearance[:, x > xmax] = clearance[y > ymax, :] = -1.0
         fits = clearance >= radius_m
         pieces, _ = scipy.ndimage.label(fits)
-        floor = Floor((xmin, ymin), cell_m, radius_m, clearance, fits)
+        edge = np.zeros_like(fits) if world is None else beside_edge(world, x, y, cell_m, radius_m)
         if inside_xy_m is not None:
-            row, column = floor.nearest_cell(np.array(inside_xy_m), "start")
-            piece = pieces[row, column]
+            floor = Floor((xmin, ymin), cell_m, radius_m, clearance, fits)
+            piece = int(pieces[floor.nearest_cell(np.array(inside_xy_m), "start")])
         else:
-            piece = meant_piece(pieces)
+            piece = meant_piece(pieces, edge)
             if not piece:
                 raise InputError(f"{where}: expected floor for a robot of radius {radius_m:g} m, found none")
-        return Floor((xmin, ymin), cell_m, radius_m, clearance, pieces == piece)
+        reachable = pieces == piece
+        if world is not None:
+            # Cells nearer to thin walls may be joined through them.
+            clear_m = max(radius_m, THIN_CELLS * cell_m)
+            pieces, _ = scipy.ndimage.label(clearance >= clear_m)
+            edge = beside_edge(world, x, y, cell_m, clear_m)
+            home = int(np.argmax(np.bincount(pieces[reachable])))
+            clearance[outside_of(pieces, edge, home)] = -1.0
+        return Floor((xmin, ymin), cell_m, radius_m, clearance, reachable)
 
     def roomy(self, spare_m: float, reach_m: float, inside_xy_m: tuple[float, float]) -> Floor:
         """The floor without what only passages lead to that leave less than ``spare_m`` beside the body.

@@ -16,7 +16,7 @@ from pilotage.kernels.grids.blocked_distance import distance_to_blocked
 from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.floor import SNAP_M, Floor
 from pilotage.maps.known_maps import OncePerMap
-from pilotage.maps.pieces import meant_piece
+from pilotage.maps.pieces import beside_edge, meant_piece
 from pilotage.maps.world_map import WorldMap
 from pilotage.missions.places import PoseConfig
 
@@ -72,7 +72,8 @@ class OpenFloor:
         self._field = chart.field if chart.geometry is None else _finer_field(chart)
         self._regions, _ = scipy.ndimage.label(self._field.distance_m >= clearance_m)
         if reachable_from is None:
-            meant = meant_piece(self._regions, self._region(0.0, 0.0) if chart.geometry is None else 0)
+            begun_on = self._region(0.0, 0.0) if chart.geometry is None else 0
+            meant = meant_piece(self._regions, self._beside_edge(), begun_on)
             self._home = meant if about is None else self._nearest_region(*about) or meant
             return
         self._home = self._region(reachable_from.x_m, reachable_from.y_m)
@@ -81,6 +82,14 @@ class OpenFloor:
                 f"world.start: expected {clearance_m:g} m to the nearest wall, from where random places are "
                 f"reached, found less at ({reachable_from.x_m:g}, {reachable_from.y_m:g})"
             )
+
+    def _beside_edge(self) -> BoolArray:
+        spacing_m, shape = self._field.resolution_m, self._regions.shape
+        y, x = (
+            low_m + spacing_m * np.arange(count)
+            for low_m, count in zip(self._field.origin_xy_m[::-1], shape, strict=True)
+        )
+        return beside_edge(self._chart, x, y, spacing_m, self._clearance_m)
 
     @cached_property
     def easy(self) -> BoolArray:
