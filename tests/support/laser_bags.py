@@ -26,6 +26,7 @@ class Scan:
     range_min_m: float = 0.1
     range_max_m: float = 30.0
     topic: str = "/scan"
+    frame: str = "laser"
 
 
 @dataclass(frozen=True)
@@ -83,7 +84,7 @@ class Messages:
 
     def scan(self, scan: Scan, stamped: bool) -> Any:
         return self.types[SCAN](
-            header=self.header(scan.t_s if stamped else 0.0, "laser"),
+            header=self.header(scan.t_s if stamped else 0.0, scan.frame),
             angle_min=scan.first_rad,
             angle_max=scan.first_rad + scan.step_rad * (len(scan.ranges_m) - 1),
             angle_increment=scan.step_rad,

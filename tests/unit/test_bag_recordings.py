@@ -20,7 +20,7 @@ from pilotage.core.types import FloatArray, Pose2
 from pilotage.experiments.recordings.bag_drive import _part_var, _scans, _sheet
 from pilotage.experiments.recordings.run_scans import read_run_scans
 from pilotage.logs.bag_kinds import LANDMARKS, POSES
-from pilotage.logs.bag_series import read_series
+from pilotage.logs.bag_series import landmarks_in_base, read_series
 from pilotage.logs.laser_log import RawScan, assemble
 from pilotage.logs.laser_recordings import read_laser_log
 from pilotage.maps.ros_map import RosMap, write_ros_map
@@ -112,6 +112,20 @@ def test_landmarks_of_every_message(form: str, table: Path, tmp_path: Path) -> N
     assert run.metrics["position_rmse_m"] < 0.02
     reckoned = pl.localize(tmp_path / name, landmarks=table, localizer="dead-reckoning", out=tmp_path)
     assert reckoned.metrics["position_rmse_m"] > 0.1
+
+
+def test_landmarks_of_two_cameras_on_one_topic_are_told_apart(tmp_path: Path) -> None:
+    """What the second camera saw was placed as if the first one had seen it."""
+    one = circle()
+    fields = detected("vision", ros.header(1000.2, "rear"), {1: (3.0, 1.0)})
+    other = Stamped("/tags", ros.nanoseconds(1000.2), DETECTIONS["vision"][0], fields)
+    write_mcap(tmp_path / "a.mcap", RunMessages([*one.stamped, other], one.own_types))
+    found = landmarks_in_base(tmp_path / "a.mcap", None, ("base_link",))
+    assert len(found.t_s) == len(PLACES) * 121
+    said = (
+        "1 of the landmarks in /tags are another sensor's, in the frame 'rear': those in 'camera' are taken"
+    )
+    assert said in found.warnings
 
 
 def test_odometry_is_calibrated_as_from_the_run_itself(

@@ -128,6 +128,15 @@ def test_two_scans_of_one_time_are_kept_and_told(tmp_path: Path) -> None:
     assert log.warnings == ("1 of the scans carry the time of the one before",)
 
 
+def test_scans_of_two_scanners_on_one_topic_are_told_apart(tmp_path: Path) -> None:
+    """The second scanner's beams were placed as the first one's."""
+    whole = drive()
+    log = read(tmp_path, with_scan(with_scan(whole, 4, frame="rear"), 7, frame="rear"))
+    assert len(log) == 28
+    said = "2 scans of /scan are another scanner's, in the frame 'rear': those in 'laser' are taken"
+    assert log.warnings == (said,)
+
+
 def test_messages_without_stamps_go_by_their_receipt(tmp_path: Path) -> None:
     log = read(tmp_path, replace(drive(), stamped=False))
     np.testing.assert_allclose(log.t_s, 1000.0 + 0.1 * np.arange(30), atol=1e-6)

@@ -17,7 +17,7 @@ import scipy
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
-from pilotage.logs.bag_kinds import LANDMARKS, POSES, ROWS
+from pilotage.logs.bag_kinds import FIELDS, LANDMARKS, POSES, RATES, ROWS
 from pilotage.logs.bag_messages import OpenBag, read_through
 from pilotage.logs.bag_topics import Kind, full_name, holds, pick
 from pilotage.logs.bags import (
@@ -28,6 +28,9 @@ from pilotage.logs.bags import (
 )
 from pilotage.logs.scanner_mount import LARGEST, TransformTree, frame_name
 from pilotage.logs.trajectories import Trajectory3
+
+MOUNTED = RATES, FIELDS, LANDMARKS
+"""What is turned into the robot's frame: of several sensors on one topic that of the first is taken."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -218,12 +221,17 @@ def _series(bag: OpenBag, path: Path, kind: Kind, name: str, said: list[str]) ->
     times: list[float] = []
     rows: list[tuple[float, ...]] = []
     frame, damaged = "", 0
+    elsewhere: dict[str, int] = {}
     for _, time_ns, message in bag.messages({name}):
         try:
             for header, row in rows_of(message):
+                seen_from = "" if header is None else frame_name(header.frame_id)
+                frame = frame or seen_from
+                if kind in MOUNTED and seen_from not in {"", frame}:
+                    elsewhere[seen_from] = elsewhere.get(seen_from, 0) + 1
+                    continue
                 times.append(_seconds(header, time_ns))
                 rows.append(row)
-                frame = frame or ("" if header is None else frame_name(header.frame_id))
         except (AttributeError, TypeError, ValueError, OverflowError, IndexError):
             damaged += 1  # None, or what a damaged definition made of it
     t_s, values = np.array(times), np.array(rows, dtype=np.float64)
@@ -234,6 +242,11 @@ def _series(bag: OpenBag, path: Path, kind: Kind, name: str, said: list[str]) ->
         fine &= sane
     if damaged:
         said.append(f"{damaged} messages of {name} that cannot be read were passed over")
+    for other, count in elsewhere.items():
+        said.append(
+            f"{count} of the {kind.what} in {name} are another sensor's, in the frame '{other}': those in "
+            f"'{frame}' are taken"
+        )
     if not fine.any():
         raise InputError(f"{path}: expected {kind.what} in {name}, found none that can be read")
     t_s, values = t_s[fine], values[fine]

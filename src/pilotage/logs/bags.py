@@ -96,6 +96,8 @@ class _Collected:
     tf_odometry: list[tuple[str, float, float, float, float]] = field(default_factory=list)
     damaged: int = 0
     unstamped: int = 0
+    elsewhere: dict[str, int] = field(default_factory=dict)
+    """How many scans have which other frames: another scanner's, whose mount is another one."""
 
 
 def _collect(bag: OpenBag, path: Path, picked: _Picked) -> LaserLog:
@@ -109,6 +111,11 @@ def _collect(bag: OpenBag, path: Path, picked: _Picked) -> LaserLog:
     said = list(picked.warnings)
     if found.damaged:
         said.append(f"{found.damaged} messages that cannot be read were passed over")
+    for frame, count in found.elsewhere.items():
+        said.append(
+            f"{count} scans of {picked.scan} are another scanner's, in the frame '{frame}': those in "
+            f"'{found.scan_frame}' are taken"
+        )
     if found.unstamped:
         said.append(f"{found.unstamped} messages carry no time: the time of receipt is used")
     t_s, poses = _odometry(found, said)
@@ -143,8 +150,12 @@ def _stamp_s(found: _Collected, header: Any, time_ns: int) -> float:
 
 
 def _add_scan(found: _Collected, message: Any, time_ns: int) -> None:
+    frame = frame_name(message.header.frame_id)
     if not found.scans:
-        found.scan_frame = frame_name(message.header.frame_id)
+        found.scan_frame = frame
+    elif frame not in {"", found.scan_frame}:
+        found.elsewhere[frame] = found.elsewhere.get(frame, 0) + 1
+        return
     found.scans.append(
         RawScan(
             _stamp_s(found, message.header, time_ns),
