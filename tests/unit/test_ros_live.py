@@ -165,7 +165,9 @@ def test_what_a_driver_says_of_beams_without_a_range_is_understood() -> None:
     """A wall too near to be measured read as nothing there, and a zero for no return as a wall."""
     sheet = LidarConfig(beams=7, field_of_view_rad=0.6, max_range_m=5.0)
     message = _scan(-0.3, 0.1, [-math.inf, 0.0, 0.05, 3.0, 9.0, math.inf, math.nan])
-    assert _ranges(message, sheet).tolist() == [0.1, 5.0, 5.0, 3.0, 5.0, 5.0, 5.0]
+    assert _ranges(message, sheet).tolist() == [0.1, 5.0, 0.1, 3.0, 5.0, 5.0, 5.0]
+    unset = _scan(-0.3, 0.1, [3.0] * 7, range_max=0.0)
+    assert _ranges(unset, sheet).tolist() == [3.0] * 7
 
 
 def test_times_are_whole_nanoseconds() -> None:

@@ -155,13 +155,14 @@ def _increment(before: Pose2, now: Pose2) -> OdometryIncrement:
 def _ranges(message: Any, sheet: LidarConfig) -> FloatArray:
     """The message's ranges along the data sheet's beams, each from the nearest of its own, after REP 117.
 
-    Minus infinity is something too near to be measured, and reads as the least range. What is beyond the
-    limits is no measurement (zero is what many drivers write where nothing returned), and reads as nothing
-    within reach, as what was not measured at all does: the stack takes finite ranges.
+    Minus infinity, and less than the least range, is something too near to be measured, and reads as the
+    least range. Zero is what many drivers write where nothing returned; that, what is beyond the limits and
+    what was not measured at all reads as nothing within reach: the stack takes finite ranges.
     """
     told = np.asarray(message.ranges, dtype=np.float64)
-    too_near = np.isneginf(told)
-    out_of_limits = (told < message.range_min) | (told <= 0.0) | (told > message.range_max)
-    ranges = np.where(too_near, max(message.range_min, 0.0), np.where(out_of_limits, np.nan, told))
+    least = max(message.range_min, 0.0)
+    farthest = message.range_max if message.range_max > least else np.inf  # some drivers leave it at zero
+    too_near = np.isneginf(told) | ((told > 0.0) & (told < least))
+    ranges = np.where(too_near, least, np.where((told <= 0.0) | (told > farthest), np.nan, told))
     found = sheet.along_own_beams(ranges, message.angle_min, message.angle_increment)
     return np.where(np.isnan(found), sheet.max_range_m, found)
