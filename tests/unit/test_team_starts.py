@@ -129,6 +129,17 @@ def test_a_house_in_a_grid_is_meant_whatever_its_white_margin(end: bool, turn_ra
         assert inside.reachable[inside.cell_of(np.array([place.x_m, place.y_m]))]
 
 
+def test_open_ground_goes_on_beyond_its_map() -> None:
+    """Of a crater in it that is closed all around, a sixth of its size, nobody speaks."""
+    cells = np.full((200, 200), FREE, np.int8)
+    cells[60:140, [60, 139]] = cells[[60, 139], 60:140] = OCCUPIED
+    grid = OccupancyGrid(cells, 0.1, Pose2(-10.0, -10.0, 0.0))
+    chart = WorldMap("ground", bounds_of(grid), grid=grid, open_ground=True)
+    place = OpenFloor(chart, 0.4, None).draw(np.random.default_rng(0))
+    assert place is not None
+    assert max(abs(place.x_m), abs(place.y_m)) > 4.0
+
+
 def test_a_map_that_a_robot_made_is_of_where_it_began() -> None:
     """A race track is a twentieth of the white around it; the map's origin is on its start line."""
     cells = np.full((200, 200), OCCUPIED, np.int8)

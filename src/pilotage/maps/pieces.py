@@ -52,7 +52,10 @@ def beside_edge(chart: WorldMap, x_m: Places, y_m: Places, spacing_m: float, cle
     """Which cells with middles at y (rows,) and x (columns,) lie along the map's edge, in a single line.
 
     A grid that is open there has a wall put up around it (``edge.closed``): floor keeps ``clearance_m`` off.
+    Open ground goes on beyond its map: none of it is outside.
     """
+    if chart.open_ground:
+        return np.zeros((len(y_m), len(x_m)), np.bool_)
     xmin, ymin, xmax, ymax = chart.bounds_m
     along, across, reach_m = x_m[None, :] - xmin, y_m[:, None] - ymin, 0.51 * spacing_m
     width_m, height_m = xmax - xmin, ymax - ymin

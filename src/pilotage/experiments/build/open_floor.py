@@ -72,7 +72,8 @@ class OpenFloor:
         self._field = chart.field if chart.geometry is None else _finer_field(chart)
         self._regions, _ = scipy.ndimage.label(self._field.distance_m >= clearance_m)
         if reachable_from is None:
-            begun_on = self._region(0.0, 0.0) if chart.geometry is None else 0
+            by_robot = chart.geometry is None and not chart.open_ground
+            begun_on = self._region(0.0, 0.0) if by_robot else 0
             meant = meant_piece(self._regions, self._beside_edge(), begun_on)
             self._home = meant if about is None else self._nearest_region(*about) or meant
             return
