@@ -96,6 +96,15 @@ class DistanceField:
         x0, y0 = self.origin_xy_m
         return x0, y0, x0 + (nx - 1) * self.resolution_m, y0 + (ny - 1) * self.resolution_m
 
+    @property
+    def axes_m(self) -> tuple[FloatArray, FloatArray]:
+        """x (nx,) of the nodes' columns and y (ny,) of their rows."""
+        x, y = (
+            np.asarray(low_m + self.resolution_m * np.arange(count), np.float64)
+            for low_m, count in zip(self.origin_xy_m, self.distance_m.shape[::-1], strict=True)
+        )
+        return x, y
+
     def at(self, points_xy_m: FloatArray) -> FloatArray:
         """Interpolated distance at points (K, 2); outside the grid 0. Returns (K,)."""
         points = np.ascontiguousarray(points_xy_m, dtype=np.float64).reshape(-1, 2)

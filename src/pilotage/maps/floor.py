@@ -166,10 +166,10 @@ class Floor:
                 raise InputError(f"{where}: expected floor for a robot of radius {radius_m:g} m, found none")
         reachable = pieces == piece
         if world is not None:
-            # Cells nearer to thin walls may be joined through them.
-            clear_m = max(radius_m, THIN_CELLS * cell_m)
-            pieces, _ = scipy.ndimage.label(clearance >= clear_m)
-            edge = beside_edge(world, x, y, cell_m, clear_m)
+            if (thin_m := THIN_CELLS * cell_m) > radius_m:
+                # Cells nearer to thin walls may be joined through them.
+                pieces, _ = scipy.ndimage.label(clearance >= thin_m)
+                edge = beside_edge(world, x, y, cell_m, thin_m)
             home = int(np.argmax(np.bincount(pieces[reachable])))
             clearance[outside_of(pieces, edge, home)] = -1.0
         return Floor((xmin, ymin), cell_m, radius_m, clearance, reachable)

@@ -74,7 +74,8 @@ class OpenFloor:
         if reachable_from is None:
             by_robot = chart.geometry is None and not chart.open_ground
             begun_on = self._region(0.0, 0.0) if by_robot else 0
-            meant = meant_piece(self._regions, self._beside_edge(), begun_on)
+            edge = beside_edge(chart, *self._field.axes_m, self._field.resolution_m, clearance_m)
+            meant = meant_piece(self._regions, edge, begun_on)
             self._home = meant if about is None else self._nearest_region(*about) or meant
             return
         self._home = self._region(reachable_from.x_m, reachable_from.y_m)
@@ -83,14 +84,6 @@ class OpenFloor:
                 f"world.start: expected {clearance_m:g} m to the nearest wall, from where random places are "
                 f"reached, found less at ({reachable_from.x_m:g}, {reachable_from.y_m:g})"
             )
-
-    def _beside_edge(self) -> BoolArray:
-        spacing_m, shape = self._field.resolution_m, self._regions.shape
-        y, x = (
-            low_m + spacing_m * np.arange(count)
-            for low_m, count in zip(self._field.origin_xy_m[::-1], shape, strict=True)
-        )
-        return beside_edge(self._chart, x, y, spacing_m, self._clearance_m)
 
     @cached_property
     def easy(self) -> BoolArray:
@@ -111,37 +104,23 @@ class OpenFloor:
             cells = Floor.of(self._chart, self._clearance_m, inside_xy_m=inside)
         except InputError:
             return home
-        axes = []
-        for count, origin_m, low_m, cell_count in zip(
-            home.shape,
-            self._field.origin_xy_m[::-1],
-            cells.origin_xy_m[::-1],
-            cells.reachable.shape,
-            strict=True,
-        ):
-            place_m = origin_m + self._field.resolution_m * np.arange(count)
-            axes.append(
-                np.clip(np.floor((place_m - low_m) / cells.cell_m).astype(np.int64), 0, cell_count - 1)
+        column, row = (
+            np.clip(np.floor((nodes_m - low_m) / cells.cell_m).astype(np.int64), 0, count - 1)
+            for nodes_m, low_m, count in zip(
+                self._field.axes_m, cells.origin_xy_m, cells.reachable.shape[::-1], strict=True
             )
-        return np.asarray(home & cells.reachable[np.ix_(*axes)])
+        )
+        return np.asarray(home & cells.reachable[np.ix_(row, column)])
 
     def _region(self, x: float, y: float) -> int:
         return int(self._at_nodes(self._regions, np.array([[x, y]]))[0])
 
     def _nearest_region(self, x: float, y: float) -> int:
         """That of the nearest node that has room, no farther than a task takes a place to be; else 0."""
-        low_m = np.asarray(self._field.origin_xy_m)
-        columns, rows = (
-            np.flatnonzero(np.abs(origin_m + self._field.resolution_m * np.arange(count) - at) <= SNAP_M)
-            for origin_m, count, at in zip(low_m, self._regions.shape[::-1], (x, y), strict=True)
-        )
+        along_m, across_m = (nodes_m - at for nodes_m, at in zip(self._field.axes_m, (x, y), strict=True))
+        columns, rows = (np.flatnonzero(np.abs(off_m) <= SNAP_M) for off_m in (along_m, across_m))
         near = self._regions[np.ix_(rows, columns)]
-        away_m = np.hypot(
-            *np.meshgrid(
-                low_m[0] + self._field.resolution_m * columns - x,
-                low_m[1] + self._field.resolution_m * rows - y,
-            )
-        )
+        away_m = np.hypot(*np.meshgrid(along_m[columns], across_m[rows]))
         away_m = np.where((near > 0) & (away_m <= SNAP_M), away_m, np.inf)
         if not np.isfinite(away_m).any():
             return 0
