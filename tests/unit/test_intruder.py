@@ -82,6 +82,12 @@ class TestWatching:
         # Somebody who is now here and now there is two, and neither for long.
         assert not any(watch.step(np.array([[5.0 * (k % 2), 1.0], [5.0 * (k % 2), 1.1]])) for k in range(9))
 
+    def test_of_several_at_once_each_has_to_be_seen_as_many_times_as_often(self) -> None:
+        watch = IntruderWatch(WatchConfig(scans=3))
+        crowd = np.array([[x + dx, 1.0] for x in (0.0, 3.0, 6.0) for dx in (0.0, 0.1)])
+        assert [len(watch.step(crowd)) for _ in range(10)] == [0] * 8 + [3, 0]
+        assert [len(watch.step(crowd[:2])) for _ in range(4)] == [0] * 4  # who is left was told already
+
 
 class TestMuseum:
     def test_he_is_detected_and_not_touched(self) -> None:

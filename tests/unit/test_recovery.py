@@ -229,5 +229,10 @@ def test_random_places_are_connected_to_the_start() -> None:
         pose = random_pose(walled(walled_off), PoseConfig(x_m=1.0, y_m=1.0), 0.5, rng)
         assert pose.x_m <= 4.5 + 1e-9
         assert plane.distance_to_nearest(pose.x_m, pose.y_m, walled_off.segments_m, np.zeros((0, 3))) >= 0.5
-    with pytest.raises(InputError, match="nearest wall"):
-        random_pose(walled(walled_off), PoseConfig(x_m=0.1, y_m=1.0), 0.5, rng)
+    # A team's starts were drawn nearer to walls than where one is carried, and refused as starts for that.
+    beside_a_wall = [
+        random_pose(walled(walled_off), PoseConfig(x_m=4.85, y_m=1.0), 0.5, rng) for _ in range(10)
+    ]
+    assert max(pose.x_m for pose in beside_a_wall) <= 4.5 + 1e-9
+    with pytest.raises(InputError, match=r"expected random places 0\.5 m from walls to be reached from"):
+        random_pose(walled(walled_off), PoseConfig(x_m=5.0, y_m=1.0), 0.5, rng)

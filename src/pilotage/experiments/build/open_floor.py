@@ -38,7 +38,7 @@ def random_pose(
     Raises
     ------
     InputError
-        Where the place itself has less clearance, or nothing is found.
+        Where no place with that clearance is reached, or nothing is found.
     """
     found = OpenFloor(chart, clearance_m, reachable_from).draw(rng)
     if found is None:
@@ -49,6 +49,8 @@ def random_pose(
 class OpenFloor:
     """The floor that is connected to a place at a clearance; without a place the one that is meant.
 
+    A place with less clearance than that, a robot's start beside a wall, is connected at what it has.
+
     Parameters
     ----------
     about
@@ -58,7 +60,7 @@ class OpenFloor:
     Raises
     ------
     InputError
-        Where the place itself has less clearance.
+        Where no place with that clearance is reached.
     """
 
     def __init__(
@@ -78,11 +80,11 @@ class OpenFloor:
             meant = meant_piece(self._regions, edge, begun_on)
             self._home = meant if about is None else self._nearest_region(*about) or meant
             return
-        self._home = self._region(reachable_from.x_m, reachable_from.y_m)
+        self._home = self._first_region(reachable_from.x_m, reachable_from.y_m)
         if self._home == 0:
             raise InputError(
-                f"world.start: expected {clearance_m:g} m to the nearest wall, from where random places are "
-                f"reached, found less at ({reachable_from.x_m:g}, {reachable_from.y_m:g})"
+                f"world.start: expected random places {clearance_m:g} m from walls to be reached from "
+                f"({reachable_from.x_m:g}, {reachable_from.y_m:g}), found none; ask for less clearance_m"
             )
 
     @cached_property
@@ -114,6 +116,22 @@ class OpenFloor:
 
     def _region(self, x: float, y: float) -> int:
         return int(self._at_nodes(self._regions, np.array([[x, y]]))[0])
+
+    def _first_region(self, x: float, y: float) -> int:
+        """That of a place; of one with less clearance the nearest that is reached at what it has, or 0."""
+        region = self._region(x, y)
+        if region:
+            return region
+        room = self._field.distance_m
+        (has_m,) = self._at_nodes(room, np.array([[x, y]]))
+        pieces, _ = scipy.ndimage.label(room >= max(float(has_m), self._field.resolution_m))
+        (piece,) = self._at_nodes(pieces, np.array([[x, y]]))
+        rows, columns = np.nonzero((pieces == piece) & (self._regions > 0))
+        if not piece or not len(rows):
+            return 0
+        along_m, across_m = self._field.axes_m
+        nearest = int(np.argmin(np.hypot(along_m[columns] - x, across_m[rows] - y)))
+        return int(self._regions[rows[nearest], columns[nearest]])
 
     def _nearest_region(self, x: float, y: float) -> int:
         """That of the nearest node that has room, no farther than a task takes a place to be; else 0."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 
+from pilotage.kernels.arrays import FloatArray
 from pilotage.kernels.geometry.solids import Cells, Tiles
 from pilotage.kernels.jit import kernel
 from pilotage.kernels.scans.tiles import CELL, COSINE, ORIGIN_X, ORIGIN_Y, SINE
@@ -67,12 +68,41 @@ def trace(u: float, v: float, du: float, dv: float, begin: float, end: float, ju
 @kernel
 def grid_beam(x: float, y: float, c: float, s: float, most: float, grid: Tiles) -> float:
     """Length of a beam along (c, s) in the map up to the first occupied cell; inf where none is nearer."""
-    jump, frame = grid[0], grid[4]
-    if jump.shape[0] == 0:
+    if grid[0].shape[0] == 0:
         return math.inf
+    return first_cell(x, y, c, s, 0.0, most, grid[0], grid[4])
+
+
+@kernel
+def first_cell(
+    x: float, y: float, c: float, s: float, least: float, most: float, jump: Cells, frame: FloatArray
+) -> float:
+    """As ``grid_beam``, of lengths from ``least`` on; ``frame`` as of ``kernels.scans.tiles``."""
     cell = frame[CELL]
     dx, dy = x - frame[ORIGIN_X], y - frame[ORIGIN_Y]
     u = (frame[COSINE] * dx + frame[SINE] * dy) / cell
     v = (frame[COSINE] * dy - frame[SINE] * dx) / cell
     du, dv = c * frame[COSINE] + s * frame[SINE], s * frame[COSINE] - c * frame[SINE]
-    return float(cell * trace(u, v, du, dv, 0.0, most / cell, jump))
+    return float(cell * trace(u, v, du, dv, least / cell, most / cell, jump))
+
+
+@kernel
+def hidden_ends(ends: FloatArray, eyes: FloatArray, beyond: float, jump: Cells, frame: FloatArray) -> int:
+    """How many of the places (K, 2) where beams ended no eye (V, 2) can have seen.
+
+    From each of them there is an occupied cell on the line, more than ``beyond`` after its begin and before
+    its end: who stands where a cell was marked is not blind.
+    """
+    count = 0
+    for k in range(ends.shape[0]):
+        hidden = True
+        for i in range(eyes.shape[0]):
+            dx, dy = ends[k, 0] - eyes[i, 0], ends[k, 1] - eyes[i, 1]
+            away = math.hypot(dx, dy)
+            hidden = away > 2.0 * beyond and math.isfinite(
+                first_cell(eyes[i, 0], eyes[i, 1], dx / away, dy / away, beyond, away - beyond, jump, frame)
+            )
+            if not hidden:
+                break
+        count += int(hidden)
+    return count

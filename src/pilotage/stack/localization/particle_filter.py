@@ -17,6 +17,7 @@ from pilotage.core.types import FloatArray, Pose2
 from pilotage.kernels.filters import particles
 from pilotage.maps.world_map import WorldMap
 from pilotage.models.odometry import OdometryModel
+from pilotage.sensors.joint_lidar import places_of_lasers_m
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, OdometryIncrement, Readings
 from pilotage.sensors.sensor import NonNegative, Positive
@@ -38,6 +39,7 @@ from pilotage.stack.localization.odometry_watch import (
 from pilotage.stack.localization.relocalization import STDS, Relocalization
 from pilotage.stack.localization.same_witness import widening
 from pilotage.stack.localization.self_check import LEAST_SEEN, ExplainedShare, SelfCheck
+from pilotage.stack.localization.walls_between import WallsBetween
 
 NAME = "particle-filter"
 COLUMNS = {"particles": "1", "effective_particles": "1", "scan_parts": "1", "localized": "1"}
@@ -164,6 +166,7 @@ class ParticleFilterLocalizer:
         angles = lidar.beam_angles_rad()[self._picked] + lidar.mount.theta_rad
         self._directions = np.column_stack([np.cos(angles), np.sin(angles)])
         self._mount_xy = np.array([lidar.mount.x_m, lidar.mount.y_m])
+        self._walls_between = WallsBetween(chart, _eyes_m(lidar, robot))
         self._max_range = min(config.max_range_m or lidar.sure_range_m, lidar.max_range_m)
         self._rng = robot.streams.stream(NAME)
         self._quantile = float(scipy.special.ndtri(config.kld_probability))
@@ -190,10 +193,14 @@ class ParticleFilterLocalizer:
             seen = self._points_of(scan.ranges_m)
             prior = self._unweighted()
             points = self._field.mapped(seen, prior[0])
+            if not self._blind and self._walls_between.speak_against(*prior, seen):
+                self._check.alarm(t_s)
             if len(points) and not self._blind:
                 weighs = not self._tells_nothing_new()
                 moments = self._weigh(points, prior[1]) if weighs else None
                 self._judge(prior, prior[0] if moments is None else moments[0], points, t_s)
+            elif self._check.lost(t_s) and len(seen) >= LEAST_SEEN:
+                self._check.alarm(t_s)  # what says nothing does not find it
         if moments is None:
             self._rounds, self._effective = 0, float(self._poses.shape[0])
             moments = self._unweighted()
@@ -362,6 +369,12 @@ class ParticleFilterLocalizer:
         particles.spread_out(self._poses, mean, root, config.spread, growth, normals)
         bins = particles.occupied_bins(self._poses, config.bin_m, config.bin_rad)
         self._wanted = math.ceil(particles.kld_count(bins, config.kld_error, self._quantile))
+
+
+def _eyes_m(lidar: LidarConfig, robot: RobotKnowledge) -> FloatArray:
+    """(V, 2) where the lasers of a scan are, in the robot's frame."""
+    mount, joined_m = lidar.mount, places_of_lasers_m(lidar, robot.sensors)
+    return mount.pose.placed(joined_m if len(joined_m) else np.zeros((1, 2)))
 
 
 def _moments(poses: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:

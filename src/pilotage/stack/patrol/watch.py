@@ -20,7 +20,9 @@ class WatchConfig(Config):
     points: int = Field(default=2, ge=1, le=1000)
     """So many returns at least."""
     scans: int = Field(default=5, ge=1, le=1000)
-    """Seen in so many scans in a row."""
+    """Seen in so many scans in a row, for each that is seen at once: the more strangers there are, the more
+    likely it is that the robot is not where it believes to be, and its localizer has not noticed yet.
+    """
     follows_m: Positive = 0.6
     """From one scan to the next it moves no farther."""
     mate_m: NonNegative = 0.3
@@ -37,7 +39,8 @@ class IntruderWatch:
 
     def __init__(self, config: WatchConfig) -> None:
         self._config = config
-        self._tracks: list[tuple[float, float, int]] = []
+        self._tracks: list[tuple[float, float, int, bool]] = []
+        """Where each is, in how many scans it was seen, and whether that was told."""
 
     def step(self, strange_xy_m: FloatArray) -> list[tuple[float, float]]:
         """Take in a scan's returns (M, 2), map frame, of what is on no map and no mate.
@@ -48,17 +51,18 @@ class IntruderWatch:
         """
         config = self._config
         found: list[tuple[float, float]] = []
-        tracks: list[tuple[float, float, int]] = []
+        tracks: list[tuple[float, float, int, bool]] = []
         if not len(strange_xy_m):  # as nearly always
             self._tracks = tracks
             return found
-        for x, y in loose_clusters(strange_xy_m, config.gap_m, config.widest_m, config.points).tolist():
-            before = [
-                count for px, py, count in self._tracks if math.hypot(x - px, y - py) <= config.follows_m
-            ]
-            count = max(before, default=0) + 1
-            if count == config.scans:
+        clusters = loose_clusters(strange_xy_m, config.gap_m, config.widest_m, config.points)
+        for x, y in clusters.tolist():
+            before = [t for t in self._tracks if math.hypot(x - t[0], y - t[1]) <= config.follows_m]
+            count = max((seen for _, _, seen, _ in before), default=0) + 1
+            told = any(was_told for _, _, _, was_told in before)
+            if not told and count >= config.scans * len(clusters):
                 found.append((x, y))
-            tracks.append((x, y, count))
+                told = True
+            tracks.append((x, y, count, told))
         self._tracks = tracks
         return found
