@@ -73,21 +73,9 @@ def update(
     pose: FloatArray, cov: FloatArray, ids: list[int], z: list[list[float]], gate: float
 ) -> tuple[int, list[int]]:
     """Update by beacons 3 at (4, 0) and 8 at (0, 5)."""
-    outcome = np.empty(len(ids), dtype=np.int64)
-    used = ekf.update_range_bearings(
-        pose,
-        cov,
-        np.array(ids, dtype=np.int64),
-        np.array([m[0] for m in z]),
-        np.array([m[1] for m in z]),
-        np.array([3, 8]),
-        np.array([[4.0, 0.0], [0.0, 5.0]]),
-        MOUNT,
-        R,
-        gate,
-        np.empty(len(ids)),
-        outcome,
-    )
+    seen = sighting.Seen(np.array(ids, dtype=np.int64), *np.array(z).T.copy())
+    known = sighting.Known(np.array([3, 8]), np.array([[4.0, 0.0], [0.0, 5.0]]))
+    used, _, outcome = ekf.update_range_bearings(pose, cov, seen, known, MOUNT, R, gate)
     return used, outcome.tolist()
 
 

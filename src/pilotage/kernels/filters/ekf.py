@@ -11,6 +11,8 @@ from pilotage.kernels.filters.sighting import (
     OUTCOME_ACCEPTED,
     OUTCOME_GATED,
     OUTCOME_UNKNOWN,
+    Known,
+    Seen,
     landmark_index,
     range_bearing,
 )
@@ -147,37 +149,27 @@ def joseph_update2(
 
 @kernel
 def update_range_bearings(
-    pose: FloatArray,
-    cov: FloatArray,
-    ids: IntArray,
-    ranges: FloatArray,
-    bearings: FloatArray,
-    known_ids: IntArray,
-    known_points: FloatArray,
-    mount: FloatArray,
-    R: FloatArray,
-    gate: float,
-    nis: FloatArray,
-    outcome: IntArray,
-) -> int:
-    """Update in place by any number of landmarks (K), one after the other; returns how many were used.
+    pose: FloatArray, cov: FloatArray, seen: Seen, known: Known, mount: FloatArray, R: FloatArray, gate: float
+) -> tuple[int, FloatArray, IntArray]:
+    """Update in place by any number of landmarks (K), one after the other, seen from ``mount`` (3,).
 
-    ``known_ids`` is sorted. ``nis`` (K,) and ``outcome`` (K,) are filled: accepted, gated, unknown id.
+    Returns how many were used, and of each its NIS (K,) and outcome (K,): accepted, gated, unknown id.
     One after the other equals jointly for a linear measurement, and re-linearizes in between otherwise.
     """
     z, innovation, H = np.empty(2), np.empty(2), np.empty((2, 3))
-    used = 0
-    for k in range(ids.shape[0]):
+    count, used = seen.ids.shape[0], 0
+    nis, outcome = np.empty(count), np.empty(count, np.int64)
+    for k in range(count):
         nis[k] = math.nan
         outcome[k] = OUTCOME_UNKNOWN
-        i = landmark_index(known_ids, ids[k])
+        i = landmark_index(known.ids, seen.ids[k])
         if i < 0:
             continue
-        mx, my = known_points[i, 0], known_points[i, 1]
+        mx, my = known.points[i, 0], known.points[i, 1]
         if not range_bearing(pose, mx, my, mount, z, H):
             continue
-        innovation[0], innovation[1] = ranges[k] - z[0], wrap(bearings[k] - z[1])
+        innovation[0], innovation[1] = seen.ranges[k] - z[0], wrap(seen.bearings[k] - z[1])
         nis[k] = joseph_update2(pose, cov, H, innovation, R, gate)
         outcome[k] = OUTCOME_ACCEPTED if nis[k] <= gate else OUTCOME_GATED
         used += outcome[k]
-    return used
+    return used, nis, outcome
