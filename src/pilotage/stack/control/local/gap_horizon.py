@@ -20,7 +20,6 @@ from pilotage.stack.control.local.command_check import ROUNDING_M, footprint_cle
 from pilotage.stack.control.local.gap_horizon_config import GapHorizonConfig
 from pilotage.stack.control.local.multi_point_turn import MultiPointTurn, find_multi_point_turn
 from pilotage.stack.control.local.narrow_passage import (
-    PASSED_BEHIND_M,
     SLOW_M_S,
     NarrowPassage,
     find_narrow_passage,
@@ -39,8 +38,6 @@ BLIND_M = 0.02
 BACK = -SLOW_M_S, 0.0
 FORESEEN_M = 0.9
 """So far ahead it looks for gaps that leave it hardly any room."""
-LOOKS_PAST_M, LOOKS_ASIDE_M = 2.0, 0.025
-"""Where it is stuck it forgets what the scan looks past so near, and by so little to the side."""
 TRIED_M = 0.3
 """Two narrow places nearer to each other than this are one."""
 TURNS_M_S = 0.1
@@ -254,9 +251,7 @@ class GapHorizon(RollingController):
             return
         self._since = (view.t_s, x, y)
         self._plan = None
-        self._ground.look_past(
-            _scanned(view, scene), _laser_xy_m(view, scene), LOOKS_PAST_M, LOOKS_ASIDE_M, PASSED_BEHIND_M
-        )
+        self._ground.look_past(_scanned(view, scene), _laser_xy_m(view, scene))
         if self._passage is not None:
             moved = self._moved_s > self._passage.begun_s
             self._passage, self._moved_s = self._passage.again(view.t_s) if moved else None, view.t_s

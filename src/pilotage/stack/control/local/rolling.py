@@ -23,6 +23,8 @@ from pilotage.stack.control.local.rolling_config import PEOPLE_FADE_HITS, Rollin
 from pilotage.stack.control.local.time_to_go import TimeToGo
 from pilotage.stack.perception.movers import Movers
 
+LOOKS_PAST_M, LOOKS_ASIDE_M, PASSED_BEHIND_M = 2.0, 0.025, 0.04
+"""What the scan looks past so near and by so little to the side, and ends so far behind, is not there."""
 INSIDE_M = 0.05
 """A point so deep inside the footprint is a mistake. Where people walk any inside is somebody who brushed
 past: behind the robot, where its laser does not look, it would shut the robot in for ever."""
@@ -358,14 +360,10 @@ class RollingGround:
         """Forget what was closed: a way through it may be better than none."""
         self._togo.open_all()
 
-    def look_past(
-        self, points_xy_m: FloatArray, laser_xy_m: tuple[float, float], reach_m: float, aside_m: float,
-        behind_m: float,
-    ) -> None:  # fmt: skip
+    def look_past(self, points_xy_m: FloatArray, laser_xy_m: tuple[float, float]) -> None:
         """Forget what a scan with its ends at points (N, 2) looks past from nearby: ``without_passed``."""
-        self._hits[:] = without_passed(
-            self._hits, self._mean, points_xy_m, *laser_xy_m, reach_m, aside_m, behind_m
-        )
+        limits_m = LOOKS_PAST_M, LOOKS_ASIDE_M, PASSED_BEHIND_M
+        self._hits[:] = without_passed(self._hits, self._mean, points_xy_m, *laser_xy_m, *limits_m)
 
     def time_to_go_beside(self, discs: FloatArray, scene: Scene) -> FloatArray:
         """Time to go (m, m) where discs (N, 3), x, y, radius in the map frame, are closed as well."""
