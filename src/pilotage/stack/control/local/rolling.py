@@ -172,24 +172,18 @@ class RollingGround:
             self._mark_first(body, float(angles[-1] - angles[0]) < math.pi - 1e-6)
         config, mount = self._config, view.mount
         ground_update.insert_scan(
-            self._hits,
-            self._mean,
-            self._seen,
+            ground_update.Grids(self._hits, self._mean, self._seen, *self._corner_m, self._cell_m),
+            ground_update.Fan(
+                ranges, first, step, view.max_range_m, self._take_sectors(angles.shape[0], step)
+            ),
             self._pose,
             mount.as_array(),
-            ranges,
-            self._take_sectors(angles.shape[0], step),
-            first,
-            step,
-            view.max_range_m,
             config.reach_m,
             dense_m(body.inner_m, step),
             still,
             body.polygon,
             0.0 if self._tracks else INSIDE_M,
             max(config.fade_hits, PEOPLE_FADE_HITS) if view.people_about else config.fade_hits,
-            *self._corner_m,
-            self._cell_m,
         )
         ground = self._ground(body, drive, rolled, avoid)
         self._answer.learn(
