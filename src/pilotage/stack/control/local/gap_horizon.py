@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from pilotage.core.types import STOP, FloatArray, Twist
+from pilotage.core.types import STOP, FloatArray, Pose2, Twist
 from pilotage.kernels.control.band import path_distances
 from pilotage.kernels.control.evasion import best_evasion
 from pilotage.kernels.control.ground import nearest_m
@@ -345,9 +345,8 @@ class GapHorizon(RollingController):
 
 
 def _laser_xy_m(view: LocalView, scene: Scene) -> tuple[float, float]:
-    x, y, theta = (float(value) for value in scene.pose)
-    c, s = math.cos(theta), math.sin(theta)
-    return x + c * view.mount.x_m - s * view.mount.y_m, y + s * view.mount.x_m + c * view.mount.y_m
+    at = Pose2.from_array(scene.pose).compose(view.mount)
+    return at.x_m, at.y_m
 
 
 def _scanned(view: LocalView, scene: Scene) -> FloatArray:
@@ -358,6 +357,4 @@ def _scanned(view: LocalView, scene: Scene) -> FloatArray:
     in_base, _ = scan_points(
         mount.x_m, mount.y_m, mount.theta_rad, ranges, float(angles[0]), step, view.max_range_m
     )
-    x, y, theta = scene.pose
-    c, s = math.cos(theta), math.sin(theta)
-    return np.asarray([x, y] + in_base @ np.array([[c, s], [-s, c]]))
+    return Pose2.from_array(scene.pose).placed(in_base)
