@@ -18,10 +18,10 @@ import time
 import numpy as np
 
 from pilotage.core.types import Twist
-from pilotage.experiments.barn_benchmark import course_base
 from pilotage.experiments.build.build import build
 from pilotage.experiments.build.robots import footprint_of, motion_of
 from pilotage.experiments.controller_benchmark import CourseRequest, course_run_mission
+from pilotage.experiments.course_driving import course_base
 from pilotage.experiments.course_families import Course, Driver, make_course_of
 from pilotage.experiments.loop import run_loop
 from pilotage.experiments.mission import mission_of

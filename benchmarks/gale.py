@@ -22,7 +22,7 @@ from pilotage.core.chi_square import chi_square_quantile
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.evaluation.driving import poses
 from pilotage.evaluation.position_region import squared_off
-from pilotage.evaluation.rover_metrics import stretches_without
+from pilotage.evaluation.terrain import stretches_without
 from pilotage.experiments.build.build import build
 from pilotage.experiments.loop import run_loop
 from pilotage.experiments.mission import load_mission

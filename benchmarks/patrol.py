@@ -20,12 +20,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from benchmarks.graph_patrol import GraphPatrol, Radio, patrol, spread_starts
 
 from pilotage.core.types import FloatArray
 from pilotage.evaluation.idleness import idleness
 from pilotage.evaluation.paired import difference
 from pilotage.experiments.build.charts import load_chart
-from pilotage.experiments.graph_patrol import GraphPatrol, Radio, patrol, spread_starts
 from pilotage.maps.floor import Floor
 from pilotage.stack.patrol.derive import derive_graph
 from pilotage.stack.patrol.graph import PatrolGraph

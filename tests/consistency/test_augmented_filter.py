@@ -13,12 +13,13 @@ import pytest
 
 from pilotage.core.chi_square import chi_square_quantile
 from pilotage.core.types import FloatArray
-from pilotage.evaluation.consistency import fraction_in_band, nees
+from pilotage.evaluation.consistency import nees
 from pilotage.evaluation.driving import covariances, poses
 from pilotage.experiments.loop import simulate
 from pilotage.experiments.mission import load_mission
 from pilotage.stack.localization.ekf_augmented import SystematicErrors
 from support.bare_robots import ON_BEACONS
+from support.nees_bands import fraction_in_band
 
 RUNS, STEPS, SETTLE = 30, 300, 10
 FEW = 10

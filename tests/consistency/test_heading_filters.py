@@ -13,7 +13,6 @@ import pytest
 
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.types import FloatArray
-from pilotage.evaluation.consistency import fraction_in_band
 from pilotage.replicas.heading_report import (
     EncoderGyroConfig,
     EncoderGyroFilter,
@@ -22,6 +21,7 @@ from pilotage.replicas.heading_report import (
 )
 from pilotage.stack.localization.gyro_bias import GyroBiasConfig, GyroBiasFilter
 from pilotage.stack.localization.heading_filter import HeadingErrors, HeadingEstimate, HeadingFilter
+from support.nees_bands import fraction_in_band
 
 RUNS, STEPS, DT = 400, 300, 0.05
 TRUE = HeadingErrors(gyro_bias_walk_var_rad2_s3=1e-6, gyro_var_rad2_per_s=1e-6)

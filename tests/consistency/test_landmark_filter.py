@@ -13,11 +13,12 @@ import numpy as np
 import pytest
 
 from pilotage.core.types import FloatArray
-from pilotage.evaluation.consistency import correlated_mean, fraction_in_band, nees
+from pilotage.evaluation.consistency import correlated_mean, nees
 from pilotage.evaluation.driving import covariances, poses
 from pilotage.experiments.loop import simulate
 from pilotage.experiments.mission import load_mission
 from support.bare_robots import ON_BEACONS
+from support.nees_bands import fraction_in_band
 
 RUNS = 40
 STEPS = 850

@@ -14,13 +14,14 @@ import numpy as np
 import pytest
 
 from pilotage.core.types import FloatArray
-from pilotage.evaluation.consistency import fraction_in_band, nees
+from pilotage.evaluation.consistency import nees
 from pilotage.evaluation.driving import covariances, poses
 from pilotage.experiments.loop import simulate
 from pilotage.experiments.mission import load_mission
 from pilotage.stack.localization.heading_filter import HEADING_FILTERS
 from pilotage.stack.localization.localizer import LOCALIZERS
 from support.bare_robots import ON_BEACONS as BARE
+from support.nees_bands import fraction_in_band
 
 RUNS, SETTLE = 24, 10
 FEW = 8

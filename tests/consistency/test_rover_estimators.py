@@ -22,6 +22,7 @@ from pilotage.core.types import FloatArray, IntArray, Pose2
 from pilotage.evaluation.consistency import nees
 from pilotage.evaluation.position_region import outlines, squared_off
 from pilotage.kernels.filters import bent_region, ekf, rover_filter, rover_odometry
+from pilotage.kernels.filters.sighting import Known, Seen
 from pilotage.kernels.jit import kernel
 from pilotage.maps.landmarks import Landmarks
 from pilotage.maps.world_map import WorldMap
@@ -113,7 +114,6 @@ def follow(
     cov, mean, spread = start.copy(), pose.copy(), start.copy()
     refused, anchor = np.zeros(1, np.int64), np.full(1, -1)
     known = np.arange(places.shape[0])
-    nis, outcome = np.empty(places.shape[0]), np.empty(places.shape[0], np.int64)
     begin = 0
     for k in range(said.shape[0]):
         part = slice(begin, ends[k])
@@ -137,10 +137,8 @@ def follow(
             poses[k], covs[k] = mean, spread
         else:
             rover_odometry.predict_first_order(pose, cov, said[k, 0], 0.0, said[k, 1], q[0], q[1])
-            ekf.update_range_bearings(
-                *(pose, cov, ids[part], ranges[part], bearings[part], known, places, np.zeros(3)),
-                *(noise, gate, nis, outcome),
-            )
+            seen = Seen(ids[part], ranges[part], bearings[part])
+            ekf.update_range_bearings(pose, cov, seen, Known(known, places), np.zeros(3), noise, gate)
             poses[k], covs[k] = pose, cov
 
 

@@ -13,11 +13,12 @@ import numpy as np
 import pytest
 
 from pilotage.core.types import FloatArray
-from pilotage.evaluation.consistency import fraction_in_band, nees
+from pilotage.evaluation.consistency import nees
 from pilotage.evaluation.driving import covariances, poses
 from pilotage.experiments.loop import simulate
 from pilotage.experiments.mission import load_mission
 from support.bare_robots import ON_WALLS
+from support.nees_bands import fraction_in_band
 
 RUNS = 24
 FEW = 8

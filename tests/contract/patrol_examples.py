@@ -6,9 +6,9 @@ import math
 from typing import Any
 
 import numpy as np
+from benchmarks.graph_patrol import GraphPatrol, Radio, patrol
 
 from pilotage.experiments.build.build import build
-from pilotage.experiments.graph_patrol import GraphPatrol, Radio, patrol
 from pilotage.experiments.loop import run_loop
 from pilotage.experiments.mission import mission_of
 from pilotage.stack.interface import StackStatus

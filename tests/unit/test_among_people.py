@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from pilotage.core.types import FloatArray, Pose2, Twist
-from pilotage.experiments.barn_benchmark import course_base
 from pilotage.experiments.controller_benchmark import CourseRequest, course_run_mission
+from pilotage.experiments.course_driving import course_base
 from pilotage.experiments.course_families import Driver, make_course_of
 from pilotage.kernels.control.footprint import discs_clearance
 from pilotage.kernels.control.motion_limits import Drive, advance

@@ -44,17 +44,17 @@ def _arrow(blocks: int, shared: int, seed: int) -> tuple[np.ndarray, ...]:
 @pytest.mark.parametrize(("blocks", "shared"), [(1, 1), (2, 3), (17, 6), (40, 20)])
 def test_solution_and_last_covariance_are_those_of_dense_algebra(blocks: int, shared: int) -> None:
     whole, right, diagonal, coupling, border, corner, own, rest = _arrow(blocks, shared, blocks)
-    status = arrow_solve.solve_arrow(diagonal, coupling, border, corner, own, rest, blocks, shared)
+    arrow = arrow_solve.Arrow(diagonal, coupling, border, corner, own, rest)
+    status = arrow_solve.solve_arrow(arrow)
     assert status == arrow_solve.SOLVED
     expected = np.linalg.solve(whole, right)
     np.testing.assert_allclose(np.concatenate([own.ravel(), rest]), expected, rtol=1e-8, atol=1e-10)
-    cov = arrow_solve.last_block_cov(diagonal[-1], border[-1], corner, shared)
+    cov = arrow_solve.last_block_cov(arrow)
     last = slice(4 * blocks - 4, 4 * blocks)
     np.testing.assert_allclose(cov, np.linalg.inv(whole)[last, last], rtol=1e-8, atol=1e-10)
 
 
 def test_a_singular_matrix_is_told() -> None:
-    *_, diagonal, coupling, border, corner, own, rest = _arrow(3, 2, 0)
-    diagonal[1] = 0.0
-    status = arrow_solve.solve_arrow(diagonal, coupling, border, corner, own, rest, 3, 2)
-    assert status == arrow_solve.NOT_POSITIVE
+    arrow = arrow_solve.Arrow(*_arrow(3, 2, 0)[2:])
+    arrow.diagonal[1] = 0.0
+    assert arrow_solve.solve_arrow(arrow) == arrow_solve.NOT_POSITIVE

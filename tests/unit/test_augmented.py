@@ -83,21 +83,10 @@ def test_an_offset_reading_is_explained_by_pose_or_offset() -> None:
         sighting.range_bearing(state[:3], x, y, MOUNT, z, H)
         ranges.append(z[0])
         bearings.append(z[1] + 0.02)
-    nis, outcome = np.empty(3), np.empty(3, dtype=np.int64)
-    ids = np.array([7, 9, 8])
-    used = augmented.update_range_bearings(
-        state,
-        cov,
-        ids,
-        np.array([*ranges, 1.0]),
-        np.array([*bearings, 0.0]),
-        np.array([7, 9]),
-        landmarks,
-        MOUNT,
-        np.diag([1e-4, 1e-4]),
-        14.0,
-        nis,
-        outcome,
+    seen = sighting.Seen(np.array([7, 9, 8]), np.array([*ranges, 1.0]), np.array([*bearings, 0.0]))
+    known = sighting.Known(np.array([7, 9]), landmarks)
+    used, nis, outcome = augmented.update_range_bearings(
+        state, cov, seen, known, MOUNT, np.diag([1e-4, 1e-4]), 14.0
     )
     assert used == 2
     assert nis[:2] == pytest.approx([0.0, 0.0], abs=1e-12)

@@ -12,8 +12,8 @@ from pilotage.core.types import FloatArray, Pose2
 from pilotage.evaluation.driving import poses
 from pilotage.experiments.loop import simulate
 from pilotage.experiments.mission import load_mission
-from pilotage.models.range_bearing import range_bearing
 from pilotage.stack.localization.beacon_fix import fix_from_beacons
+from support.models import range_bearing
 
 MOUNT = np.array([0.1, -0.05, 0.3])
 R = np.diag([3.4665e-4, 1.1771e-4])

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from pilotage.cli.main import main
-from pilotage.experiments.barn_benchmark import led_by
 from pilotage.experiments.barn_bounds import has_way
+from pilotage.experiments.course_driving import led_by
 from pilotage.experiments.values import parse_override
 from pilotage.logs.barn import START, BarnWorld, path_clearance_m
 

@@ -13,8 +13,8 @@ import pytest
 
 from pilotage.cli.main import main
 from pilotage.evaluation.courses import CourseRun, summarize_courses
-from pilotage.experiments.barn_benchmark import course_base
 from pilotage.experiments.controller_benchmark import CourseRequest, drive_course
+from pilotage.experiments.course_driving import course_base
 from pilotage.experiments.course_families import Course, Driver, make_course_of
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.models.footprint import Footprint

@@ -14,13 +14,14 @@ from pilotage.core.types import FloatArray, Pose2, Twist
 from pilotage.maps.near_walls import NearWalls
 from pilotage.models.footprint import Footprint
 from pilotage.models.motion.bicycle import BicycleConfig
-from pilotage.models.odometry import OdometryModel, move
+from pilotage.models.odometry import OdometryModel
 from pilotage.sensors.readings import Readings, UltrasonicReading
 from pilotage.stack.control.back_out import BackOut, BackOutConfig
 from pilotage.stack.control.guard import ArcGuard, GuardConfig
 from pilotage.stack.control.pi_follower import PiFollower, PiFollowerConfig
 from pilotage.stack.control.reactive import Reaction, ReactionKind
 from pilotage.stack.control.ultrasonic_reaction import UltrasonicReaction, UltrasonicReactionConfig
+from support.models import move
 from support.robots import told_of
 
 NOTHING = NearWalls(np.zeros((0, 4)))

@@ -13,12 +13,10 @@ from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
 from pilotage.kernels.control.footprint import (
     discs_clearance,
-    first_contact,
     polygon_distance,
 )
 from pilotage.kernels.control.ground import Ground, clearance_m, sure_clearance
 from pilotage.kernels.control.ground_shown import believed
-from pilotage.kernels.geometry.motion import exact_arc
 from pilotage.kernels.grids.distance import nearest_marked
 from pilotage.stack.control.local.body import make_body
 
@@ -111,28 +109,6 @@ def test_grid_never_calls_near_what_is_far_nor_far_what_is_near(
         assert exact - 1e-12 <= found <= exact + 2.0 * 0.05 * math.sqrt(2.0)
     else:
         assert found <= exact + 2.0 * 0.05 * math.sqrt(2.0) or found < 0.0
-
-
-@given(
-    st.floats(-0.5, 0.5),
-    st.floats(-1.0, 1.0),
-    st.lists(st.tuples(COORDINATE, COORDINATE), min_size=1, max_size=6),
-)
-def test_first_contact_is_where_a_fine_walk_first_touches(
-    distance: float, angle: float, places: list[tuple[float, float]]
-) -> None:
-    discs = np.column_stack([np.array(places), np.full(len(places), 0.075)])
-    if discs_clearance(0.0, 0.0, 0.3, JACKAL, discs) <= 2e-3:
-        return
-    share, _ = first_contact(0.0, 0.0, 0.3, distance, angle, JACKAL, discs)
-    walked = [
-        discs_clearance(*exact_arc(0.0, 0.0, 0.3, t * distance, t * angle), JACKAL, discs)
-        for t in np.linspace(0.0, share, 200)
-    ]
-    assert min(walked) >= 0.0
-    if share < 1.0:
-        end = discs_clearance(*exact_arc(0.0, 0.0, 0.3, share * distance, share * angle), JACKAL, discs)
-        assert end <= 1e-3
 
 
 def test_bounds_of_a_body_hold_it() -> None:

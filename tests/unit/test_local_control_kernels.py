@@ -17,7 +17,7 @@ from pilotage.kernels.control.dynamic_window import choose_in_window, window
 from pilotage.kernels.control.evasion import best_evasion
 from pilotage.kernels.control.footprint import discs_clearance
 from pilotage.kernels.control.ground_shown import believed, rolled
-from pilotage.kernels.control.ground_update import insert_scan, sectors
+from pilotage.kernels.control.ground_update import Fan, Grids, insert_scan, sectors
 from pilotage.kernels.control.heading_vector import along_arc
 from pilotage.kernels.control.match import match_scan
 from pilotage.kernels.control.merged_means import merged_means, without_passed
@@ -74,10 +74,8 @@ def test_sectors_leave_out_only_what_no_beam_reaches(beams: int, view_rad: float
         for of_sectors in (culled, every):
             left, known = hits.copy(), seen.copy()
             mount, points, first = np.array([0.1, 0.05, 0.4]), np.zeros((0, 2)), -0.5 * view_rad
-            insert_scan(
-                left, mean, known, pose, mount, ranges, of_sectors, first, step, 9.0, 4.0, 9.0,
-                points, body.polygon, 0.05, 3, -3.0, -3.0, 0.1,
-            )  # fmt: skip
+            grids, fan = Grids(left, mean, known, -3.0, -3.0, 0.1), Fan(ranges, first, step, 9.0, of_sectors)
+            insert_scan(grids, fan, pose, mount, 4.0, 9.0, points, body.polygon, 0.05, 3)
             outcomes.append((left, known))
         assert (outcomes[0][0] == outcomes[1][0]).all()
         assert (outcomes[0][1] == outcomes[1][1]).all()
@@ -91,10 +89,9 @@ def test_ground_between_beams_that_an_obstacle_fits_between_was_not_seen() -> No
     hits, mean = np.zeros((n, n), np.uint8), np.zeros((n * n, 2))
     still, body, step = np.zeros(3), make_body(JACKAL), 0.8
     seen = np.zeros((n // 2, n // 2), np.bool_)
-    insert_scan(
-        hits, mean, seen, still, still, np.full(3, 4.0), sectors(3, step), -step, step, 9.0, 4.0,
-        dense_m(0.5, step), np.zeros((0, 2)), body.polygon, 0.05, 3, -5.0, -5.0, cell,
-    )  # fmt: skip
+    grids = Grids(hits, mean, seen, -5.0, -5.0, cell)
+    fan = Fan(np.full(3, 4.0), -step, step, 9.0, sectors(3, step))
+    insert_scan(grids, fan, still, still, 4.0, dense_m(0.5, step), np.zeros((0, 2)), body.polygon, 0.05, 3)
     rows, columns = np.nonzero(seen)
     away_m = np.hypot(-5.0 + 2.0 * cell * (rows + 0.5), -5.0 + 2.0 * cell * (columns + 0.5))
     assert 0.7 < away_m.max() <= dense_m(0.5, step) == pytest.approx(1.0 / math.tan(step))
@@ -343,13 +340,12 @@ def _stared_at(depth_m: float, seconds: float) -> tuple[ByteArray, FloatArray]:
     step = float(angles[1] - angles[0])
     body = make_body(JACKAL)
     still = np.zeros(3)
+    grids = Grids(hits, mean, seen, -1.5, -1.5, cell)
     for _ in range(round(seconds / 0.05)):
         ranges = (1.0 + depth_m) / np.cos(angles) + rng.normal(0.0, 0.01, beams)
         points = np.column_stack([ranges * np.cos(angles), ranges * np.sin(angles)])
-        insert_scan(
-            hits, mean, seen, still, still, ranges, sectors(beams, step), float(angles[0]), step, 9.0, 4.0,
-            9.0, points, body.polygon, 0.05, 3, -1.5, -1.5, cell,
-        )  # fmt: skip
+        fan = Fan(ranges, float(angles[0]), step, 9.0, sectors(beams, step))
+        insert_scan(grids, fan, still, still, 4.0, 9.0, points, body.polygon, 0.05, 3)
     return believed(hits), mean
 
 

@@ -13,8 +13,8 @@ from pilotage.core.angles import wrap_to_pi
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.kernels.filters.ekf import predict_sideways
 from pilotage.kernels.geometry.motion import exact_arc, sideways
-from pilotage.models.odometry import OdometryModel, chord, move, move_jacobians
-from pilotage.models.range_bearing import range_bearing
+from pilotage.models.odometry import OdometryModel, chord
+from support.models import move, move_jacobians, range_bearing
 
 angle = st.floats(-3.1, 3.1)
 place = st.floats(-20.0, 20.0)

@@ -13,14 +13,14 @@ from pilotage.core.types import FloatArray
 from pilotage.experiments.mission import mission_of, read_mission
 from pilotage.experiments.run import run_mission
 from pilotage.kernels.control.ground import Ground, exact_clearance
-from pilotage.kernels.control.multi_point_turn import multi_point_turn
+from pilotage.kernels.control.multi_point_turn import OFF_RAD, multi_point_turn
 from pilotage.kernels.geometry.motion import wrap
 from pilotage.stack.control.local.body import make_body
 from support.seen_ground import JACKAL, ground_of
 
 BODY = make_body(JACKAL)
 BEHIND = -1.0, 0.0
-OFF_RAD, MARGIN_M, BEHIND_M = 0.35, 0.01, 0.02
+MARGIN_M, BEHIND_M = 0.01, 0.02
 
 
 def _dead_end(width_m: float) -> FloatArray:
@@ -46,7 +46,7 @@ def test_it_turns_where_a_turn_on_the_spot_would_touch() -> None:
     start = np.array([0.0, 0.028, 0.08])
     spot = [[start[0], start[1], start[2] + turn] for turn in np.linspace(0.0, 2.0 * math.pi, 72)]
     assert min(_clearance_m(np.array(pose), ground) for pose in spot) < 0.0
-    poses = multi_point_turn(start, *BEHIND, OFF_RAD, BODY, ground, MARGIN_M, BEHIND_M)
+    poses = multi_point_turn(start, *BEHIND, BODY, ground, MARGIN_M, BEHIND_M)
     assert (poses[0] == start).all()
     x, y, theta = poses[-1]
     assert abs(wrap(math.atan2(BEHIND[1] - y, BEHIND[0] - x) - theta)) < OFF_RAD
@@ -60,17 +60,15 @@ def test_it_turns_where_a_turn_on_the_spot_would_touch() -> None:
 
 def test_nothing_is_found_where_the_body_does_not_fit_across() -> None:
     ground = ground_of(_dead_end(0.66))
-    assert not len(
-        multi_point_turn(np.array([0.0, 0.0, 0.0]), *BEHIND, OFF_RAD, BODY, ground, MARGIN_M, BEHIND_M)
-    )
+    assert not len(multi_point_turn(np.array([0.0, 0.0, 0.0]), *BEHIND, BODY, ground, MARGIN_M, BEHIND_M))
 
 
 def test_no_turn_leads_over_ground_that_nobody_saw() -> None:
     ground = ground_of(_dead_end(0.9))
     start = np.array([0.0, 0.0, 0.0])
-    assert len(multi_point_turn(start, *BEHIND, OFF_RAD, BODY, ground, MARGIN_M, BEHIND_M)) > 1
+    assert len(multi_point_turn(start, *BEHIND, BODY, ground, MARGIN_M, BEHIND_M)) > 1
     unseen = ground._replace(unseen_m=np.zeros_like(ground.unseen_m))
-    assert not len(multi_point_turn(start, *BEHIND, OFF_RAD, BODY, unseen, MARGIN_M, BEHIND_M))
+    assert not len(multi_point_turn(start, *BEHIND, BODY, unseen, MARGIN_M, BEHIND_M))
 
 
 def test_a_jackal_gets_out_of_a_dead_end_that_it_began_askew_in() -> None:

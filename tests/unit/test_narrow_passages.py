@@ -16,10 +16,10 @@ from pilotage.kernels.control.togo import UNREACHED_S, togo_at
 from pilotage.kernels.scans.rays import fan_ranges
 from pilotage.models.footprint import Footprint
 from pilotage.stack.control.local.drive import polygon_around
-from pilotage.stack.control.local.gap_horizon import LOOKS_ASIDE_M, LOOKS_PAST_M, GapHorizon
+from pilotage.stack.control.local.gap_horizon import GapHorizon
 from pilotage.stack.control.local.gap_horizon_config import GapHorizonConfig
 from pilotage.stack.control.local.gap_strip import sides_begin_m, widest_strip
-from pilotage.stack.control.local.narrow_passage import PASSED_BEHIND_M, NarrowPassage
+from pilotage.stack.control.local.narrow_passage import NarrowPassage
 from pilotage.stack.control.local.role import LocalLimits, LocalView
 from pilotage.stack.control.local.rolling import RollingGround, Scene
 from pilotage.stack.control.local.rolling_config import RollingConfig
@@ -197,7 +197,7 @@ def test_where_it_is_stuck_it_forgets_what_the_scan_looks_past() -> None:
     view = _view(0.05, here, wall)
     before = ground.update(view).ground.hits.copy()
     points = np.column_stack([np.cos(ANGLES), np.sin(ANGLES)]) * np.minimum(view.ranges_m, 20.0)[:, None]
-    ground.look_past(points, (0.0, 0.0), LOOKS_PAST_M, LOOKS_ASIDE_M, PASSED_BEHIND_M)
+    ground.look_past(points, (0.0, 0.0))
     scene = ground.update(_view(0.1, here, wall))
     rows, columns = np.nonzero(scene.ground.hits)
     means = scene.ground.mean[rows * scene.ground.hits.shape[0] + columns]

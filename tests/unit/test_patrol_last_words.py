@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from benchmarks.graph_patrol import GraphPatrol, Radio, patrol
 
 from contract.patrol_examples import lattice
 from pilotage.core.types import Pose2
 from pilotage.evaluation.idleness import idleness
-from pilotage.experiments.graph_patrol import GraphPatrol, Radio, patrol
 from pilotage.stack.patrol.graph import PatrolGraph
 from pilotage.stack.patrol.last_words import LastWords
 from pilotage.stack.patrol.looking import Looking

@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 import pytest
+from benchmarks.graph_patrol import GraphPatrol, Radio, patrol
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pilotage.evaluation.idleness import Idleness, idleness
-from pilotage.experiments.graph_patrol import GraphPatrol, Radio, patrol
 from pilotage.stack.patrol.messages import PatrolMemory
 from pilotage.stack.patrol.strategy import PatrolSetting, following
 from pilotage.stack.patrol.tours import Round, idleness_bound_s

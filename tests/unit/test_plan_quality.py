@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pilotage.evaluation.plan_quality import clearance_m
+from pilotage.evaluation.driving import clearance_m
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.models.footprint import Footprint
 

@@ -21,7 +21,7 @@ def _cost(poses: np.ndarray, k: int, i: int) -> float:
 def test_the_nearest_of_each_pass_are_paired(since: int) -> None:
     generator = np.random.default_rng(20 + since)
     poses = generator.uniform([0.0, 0.0, -9.0], [6.0, 6.0, 9.0], (160, 3))
-    pairs = passes_near(poses, since, BEHIND, RADIUS_M, TURN_RAD, TURN_M, APART, MOST)
+    pairs = passes_near(poses, since)
     assert len(pairs) > 300
     for i in range(len(poses)):
         chosen = pairs[pairs[:, 1] == i, 0].tolist()
@@ -36,4 +36,4 @@ def test_the_nearest_of_each_pass_are_paired(since: int) -> None:
 
 def test_a_few_keyframes_have_no_pass_behind_them() -> None:
     for count in range(BEHIND + 1):
-        assert passes_near(np.zeros((count, 3)), 0, BEHIND, 2.5, 1.6, 0.6, APART, MOST).shape == (0, 2)
+        assert passes_near(np.zeros((count, 3)), 0).shape == (0, 2)

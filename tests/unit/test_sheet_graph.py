@@ -10,6 +10,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pilotage.kernels.filters.arrow_solve import no_arrow
 from pilotage.kernels.sheet import graph as sheet_graph
 
 POSES = st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), st.floats(-3.0, 3.0))
@@ -62,16 +63,9 @@ def test_odometrys_right_hand_side_is_minus_its_gradient() -> None:
     steps[:, 5] = 0.3
 
     def built(poses: np.ndarray, systematic: np.ndarray) -> tuple[np.ndarray, ...]:
-        parts = (
-            np.zeros((n, 4, 4)),
-            np.zeros((n, 4, 4)),
-            np.zeros((n, 4, shared)),
-            np.zeros((shared, shared)),
-            np.zeros((n, 4)),
-            np.zeros(shared),
-        )
-        sheet_graph.add_odometry(poses, systematic, steps, spreads, n, *parts)
-        return parts
+        arrow = no_arrow(n, 4, shared)
+        sheet_graph.add_odometry(poses, systematic, steps, spreads, n, arrow)
+        return arrow
 
     def cost(values: np.ndarray) -> float:
         p, s = values[: 4 * n].reshape(n, 4), values[4 * n :]

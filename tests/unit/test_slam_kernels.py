@@ -25,7 +25,7 @@ HERE = np.array([2.0, 3.5, 0.2])
 
 def cloud(pose: FloatArray, noise: FloatArray | float = 0.0) -> FloatArray:
     points, hit = scan_points(ranges(furnished(), pose, ANGLES) + noise, RAYS, 0.1, 30.0)
-    return scan_lines(points, hit, 0.0, 0.0, float(ANGLES[1] - ANGLES[0]))
+    return scan_lines(points, hit, float(ANGLES[1] - ANGLES[0]))
 
 
 def aligned(
@@ -116,7 +116,7 @@ def test_the_covariance_of_a_match_is_that_of_many_matches() -> None:
 def test_a_bare_corridor_leaves_its_direction_open() -> None:
     walls = np.array([(-60.0, -1.0, 60.0, -1.0), (-60.0, 1.0, 60.0, 1.0)])
     points, hit = scan_points(ranges(walls, np.zeros(3), ANGLES), RAYS, 0.1, 25.0)
-    lines = scan_lines(points, hit, 0.0, 0.0, float(ANGLES[1] - ANGLES[0]))
+    lines = scan_lines(points, hit, float(ANGLES[1] - ANGLES[0]))
     _, hessian, _, _ = aligned(lines, np.zeros(3), lines)
     assert hessian[0, 0] < 1e-3 * hessian[1, 1]
 
@@ -290,7 +290,7 @@ def test_lines_go_on_over_beams_that_are_missing() -> None:
     measured = ranges(wall, np.zeros(3), ANGLES)
     lost = np.where(np.random.default_rng(9).random(measured.size) < 0.33, np.inf, measured)
     points, hit = scan_points(lost, RAYS, 0.1, 25.0)
-    lines = scan_lines(points, hit, 0.0, 0.0, float(ANGLES[1] - ANGLES[0]))
+    lines = scan_lines(points, hit, float(ANGLES[1] - ANGLES[0]))
     assert (np.hypot(lines[:, 2], lines[:, 3]) > 0.5).mean() > 0.9
     middle = measured.size // 2
     few = np.full(measured.size, np.inf)
@@ -298,4 +298,4 @@ def test_lines_go_on_over_beams_that_are_missing() -> None:
         [middle - 3, middle - 2, middle + 2, middle + 3]
     ]
     points, hit = scan_points(few, RAYS, 0.1, 25.0)
-    assert not scan_lines(points, hit, 0.0, 0.0, float(ANGLES[1] - ANGLES[0]))[:, 2:4].any()
+    assert not scan_lines(points, hit, float(ANGLES[1] - ANGLES[0]))[:, 2:4].any()

@@ -57,7 +57,7 @@ def test_lines_of_some_beams_are_those_of_the_whole_scan() -> None:
     points, hit = scan_points(seen, RAYS, 0.1, 30.0)
     step, beams = float(ANGLES[1] - ANGLES[0]), np.flatnonzero(hit)
     np.testing.assert_array_equal(
-        lines_of(points, hit, beams[1::3].copy(), 0.0, 0.0, step),
+        lines_of(points, hit, beams[1::3].copy(), step),
         scan_cloud(seen, RAYS, step, 0.1, 30.0)[1::3],
     )
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pilotage.evaluation.split_errors import split_errors
+from pilotage.evaluation.driving import split_errors
 from pilotage.stack.navigator.goal_config import Mode
 
 

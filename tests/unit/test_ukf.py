@@ -93,9 +93,9 @@ def test_small_updates_equal_the_ekfs(update: object, seed: int) -> None:
     results = []
     for kernel in (ekf.update_range_bearings, update):
         p, c = pose.copy(), cov.copy()
-        nis, outcome = np.empty(1), np.empty(1, dtype=np.int64)
         assert callable(kernel)
-        kernel(p, c, IDS, measured[:1], measured[1:], IDS, landmark, MOUNT, R, math.inf, nis, outcome)
+        seen = sighting.Seen(IDS, measured[:1], measured[1:])
+        _, nis, _ = kernel(p, c, seen, sighting.Known(IDS, landmark), MOUNT, R, math.inf)
         results.append((p, c, nis[0]))
     assert results[1][0] == pytest.approx(results[0][0], abs=2e-5)
     assert results[1][1] == pytest.approx(results[0][1], abs=1e-7)
@@ -113,9 +113,9 @@ def test_the_iterated_filter_finds_the_posteriors_maximum() -> None:
         return np.concatenate([root.T @ (x - prior), (measured - z) / np.sqrt(np.diag(R))])
 
     best = least_squares(residuals, prior, xtol=1e-12, ftol=1e-12, gtol=1e-12).x
-    nis, outcome = np.empty(1), np.empty(1, dtype=np.int64)
     plain, plain_cov = pose.copy(), cov.copy()
-    arguments = (IDS, measured[:1], measured[1:], IDS, landmark, MOUNT, R, math.inf, nis, outcome)
+    seen = sighting.Seen(IDS, measured[:1], measured[1:])
+    arguments = (seen, sighting.Known(IDS, landmark), MOUNT, R, math.inf)
     ekf.update_range_bearings(plain, plain_cov, *arguments)
     iekf.update_range_bearings(pose, cov, *arguments)
     assert pose == pytest.approx(best, abs=1e-5)
@@ -125,21 +125,9 @@ def test_the_iterated_filter_finds_the_posteriors_maximum() -> None:
 def test_an_update_far_off_is_gated_and_changes_nothing() -> None:
     for update in (ukf.update_range_bearings, iekf.update_range_bearings):
         pose, cov = np.zeros(3), np.diag([1e-4, 1e-4, 1e-4])
-        nis, outcome = np.empty(2), np.empty(2, dtype=np.int64)
-        used = update(
-            pose,
-            cov,
-            np.array([3, 5]),
-            np.array([9.0, 1.0]),
-            np.array([0.0, 0.0]),
-            IDS,
-            np.array([[4.0, 0.0]]),
-            MOUNT,
-            R,
-            13.8,
-            nis,
-            outcome,
-        )
+        seen = sighting.Seen(np.array([3, 5]), np.array([9.0, 1.0]), np.array([0.0, 0.0]))
+        known = sighting.Known(IDS, np.array([[4.0, 0.0]]))
+        used, _, outcome = update(pose, cov, seen, known, MOUNT, R, 13.8)
         assert used == 0
         assert outcome.tolist() == [sighting.OUTCOME_GATED, sighting.OUTCOME_UNKNOWN]
         assert (pose == 0.0).all()

@@ -17,8 +17,8 @@ from pilotage.kernels.lines import joint_association
 from pilotage.kernels.lines.wall_candidates import BESIDE_M, overlap_share
 from pilotage.maps.segment_map import SegmentMap, box_segments
 from pilotage.maps.wall_lines import WallLines, normal_form
-from pilotage.models.wall_line import wall_line
 from pilotage.stack.localization.wall_matching import AMBIGUOUS, UNMATCHED, WallMatcher, WallMatchingConfig
+from support.models import wall_line
 from support.walls import extractor, scan_of
 
 MOUNT = np.zeros(3)

@@ -97,7 +97,7 @@ class MissionVectorEnv(VectorEnv[Any, Any, Any]):
         limits = np.array([motion.max_speed_m_s, motion.max_turn_rate_rad_s, *changes])
         self._top = limits[:2].copy()
         self._beams, self._noisy = lidar.beams, lidar.range_var_m2 > 0.0
-        mount = np.array([lidar.mount.x_m, lidar.mount.y_m, lidar.mount.theta_rad])
+        mount = lidar.mount.as_array()
         steps = math.ceil(self.mission.run.time_limit_s / dt_s - 1e-9)
         self._fixed: tuple[Any, ...] = (
             body.state.copy(),

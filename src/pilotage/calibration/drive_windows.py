@@ -111,8 +111,8 @@ def _ratios(log: MrclamLog) -> tuple[FloatArray, FloatArray, FloatArray]:
         inside &= (t < left) | (t > right)
     inside &= (log.ranges_m[rows] > 0.1) & (np.cos(log.bearings_rad[rows]) > 0.2)
     rows, t = rows[inside], t[inside]
-    order = np.argsort(log.landmarks.ids)
-    places = log.landmarks.points_xy_m[order][np.searchsorted(log.landmarks.ids[order], log.subjects[rows])]
+    known = log.landmarks.by_id()
+    places = known.points[np.searchsorted(known.ids, log.subjects[rows])]
     x, y = (np.interp(t, log.truth_t_s, log.truth[:, i]) for i in (0, 1))
     true = np.hypot(places[:, 0] - x, places[:, 1] - y)
     return t, np.log(log.ranges_m[rows] / true), np.log(np.cos(log.bearings_rad[rows]))

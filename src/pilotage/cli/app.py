@@ -8,22 +8,19 @@ from typing import Annotated
 import typer
 
 from pilotage.cli.attribute import attribute
-from pilotage.cli.bench import bench
-from pilotage.cli.bench_scen import bench_scen
+from pilotage.cli.bench import bench, bench_scen
 from pilotage.cli.calibrate import calibrate
-from pilotage.cli.components import components
+from pilotage.cli.components import components, missions, schema
 from pilotage.cli.draw import draw, vectorize
 from pilotage.cli.evaluate import evaluate
 from pilotage.cli.export import export
 from pilotage.cli.live import drive, serve
 from pilotage.cli.localize import localize
 from pilotage.cli.map_score import map_score
-from pilotage.cli.missions import missions
 from pilotage.cli.new import new
 from pilotage.cli.plan import plan
 from pilotage.cli.report import report
 from pilotage.cli.run import run
-from pilotage.cli.schema import schema
 from pilotage.cli.slam import slam
 from pilotage.cli.study import study, sweep
 from pilotage.cli.track import track

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from pilotage.cli.options import Json, Overrides, Plugins
+from pilotage.cli.options import Json, Overrides, Plugins, WorkerCount
 from pilotage.cli.output import print_columns, print_json, print_line
 from pilotage.cli.study import (
     TIMEOUT_S,
@@ -19,7 +19,6 @@ from pilotage.cli.study import (
     Show,
     Studies,
     TrialTimeout,
-    WorkerCount,
     WorkerMemory,
     run_study_quietly,
 )

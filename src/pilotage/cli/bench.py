@@ -6,11 +6,11 @@ import os
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
 
-from pilotage.cli.options import Json, Overrides, Plugins, Seed, parse_out
+from pilotage.cli.options import Json, Overrides, Plugins, Seed, WorkerCount, parse_out
 from pilotage.cli.output import print_columns, print_json, print_line, stdout_for_json
 from pilotage.core.errors import InputError
 
@@ -18,6 +18,15 @@ if TYPE_CHECKING:
     from pilotage.evaluation.barn import BarnRun
     from pilotage.experiments.barn_benchmark import BarnAnswer
     from pilotage.experiments.controller_benchmark import CourseAnswer
+
+K = TypeVar("K")
+Trials = Annotated[int, typer.Option(metavar="N", min=1, max=10_000, help="Runs on each course.")]
+Replays = Annotated[
+    int, typer.Option(metavar="N", min=0, max=100, help="Worst runs of each controller with a replay.")
+]
+Results = Annotated[
+    Path, typer.Option(metavar="DIR", parser=parse_out, help="Folder for the rows and the page.")
+]
 
 bench = typer.Typer(
     name="bench",
@@ -37,23 +46,17 @@ def barn(
         list[str] | None,
         typer.Option(metavar="NAME", help="A local controller; repeatable. Default: gap-horizon."),
     ] = None,
-    trials: Annotated[int, typer.Option(metavar="N", min=1, max=10_000, help="Runs on each course.")] = 10,
+    trials: Trials = 10,
     count: Annotated[
         int | None,
         typer.Option("--courses", metavar="N", min=1, help="So many courses, evenly spread; default: all."),
     ] = None,
-    workers: Annotated[
-        int | None, typer.Option(metavar="N", min=1, help="Processes on this machine; default: all cores.")
-    ] = None,
+    workers: WorkerCount = None,
     seed: Seed = None,
     overrides: Overrides = None,
     plugin: Plugins = None,
-    out: Annotated[
-        Path, typer.Option(metavar="DIR", parser=parse_out, help="Folder for the rows and the page.")
-    ] = Path("runs/bench-barn"),
-    replays: Annotated[
-        int, typer.Option(metavar="N", min=0, max=100, help="Worst runs of each controller with a replay.")
-    ] = 3,
+    out: Results = Path("runs/bench-barn"),
+    replays: Replays = 3,
     json: Json = False,
 ) -> int:
     """Drive the BARN courses: first contact fails, 100 s are the limit, within 1 m of the goal is there."""
@@ -64,13 +67,11 @@ def barn(
         first_worlds,
         published_runs,
         summary_values,
+        write_barn,
     )
-    from pilotage.experiments.barn_files import write_barn
     from pilotage.logs.barn import read_barn
 
-    names = tuple(controller or ("gap-horizon",))
-    if len(set(names)) < len(names):
-        raise InputError("--controller: expected every name once, found one twice")
+    names = _once(tuple(controller or ("gap-horizon",)), "--controller")
     courses = first_worlds(read_barn(worlds), count)
     published = published_runs(worlds, courses)  # what is damaged is told before anything is driven
     request = BarnRequest(
@@ -105,19 +106,13 @@ def controllers(
         typer.Option(metavar="NAME", help="A local controller; repeatable. Default: gap-horizon and dwa."),
     ] = None,
     courses: Annotated[int, typer.Option(metavar="N", min=1, max=10_000, help="Courses of each family.")] = 5,
-    trials: Annotated[int, typer.Option(metavar="N", min=1, max=10_000, help="Runs on each course.")] = 2,
-    workers: Annotated[
-        int | None, typer.Option(metavar="N", min=1, help="Processes on this machine; default: all cores.")
-    ] = None,
+    trials: Trials = 2,
+    workers: WorkerCount = None,
     seed: Seed = None,
     overrides: Overrides = None,
     plugin: Plugins = None,
-    out: Annotated[
-        Path, typer.Option(metavar="DIR", parser=parse_out, help="Folder for the rows and the page.")
-    ] = Path("runs/bench-controllers"),
-    replays: Annotated[
-        int, typer.Option(metavar="N", min=0, max=100, help="Worst runs of each controller with a replay.")
-    ] = 3,
+    out: Results = Path("runs/bench-controllers"),
+    replays: Replays = 3,
     json: Json = False,
 ) -> int:
     """Drive local controllers through doors, corridors, narrow openings, maps and among people."""
@@ -130,20 +125,17 @@ def controllers(
     )
     from pilotage.experiments.course_families import DRAWN
     from pilotage.report.barn.controllers import ControllersPage, write_controllers_report
-    from pilotage.report.page import write_report
 
-    names, kinds = tuple(controller or ("gap-horizon", "dwa")), tuple(families or DRAWN)
-    for given, what in ((names, "--controller"), (kinds, "FAMILY")):
-        if len(set(given)) < len(given):
-            raise InputError(f"{what}: expected every name once, found one twice")
+    names = _once(tuple(controller or ("gap-horizon", "dwa")), "--controller")
+    kinds = _once(tuple(families or DRAWN), "FAMILY")
     request = CourseRequest(
         kinds, names, courses, trials, workers or os.cpu_count() or 1, seed or 0, tuple(overrides or ())
     )
     with stdout_for_json(json):
         answer = bench_controllers(request, _show if sys.stderr.isatty() else None)
         made = write_answer(answer, out, replays)
-        links = {key: write_report(run_dir).relative_to(out).as_posix() for key, run_dir in made.items()}
-        page = write_controllers_report(out, ControllersPage(answer.runs, answer.without_way, links))
+        shown = ControllersPage(answer.runs, answer.without_way, _pages_of(made, out))
+        page = write_controllers_report(out, shown)
     for family, count in answer.without_way.items():
         print_line(
             f"{family}: {count} of {courses} courses without a way for this robot, not driven", sys.stderr
@@ -170,23 +162,23 @@ def _write_page(
 ) -> Path:
     from pilotage.logs.barn import path_clearance_m
     from pilotage.report.barn.page import BarnPage, write_barn_report
+
+    clearance_m = {world.number: path_clearance_m(world) for world in answer.request.worlds}
+    links = _pages_of(replayed, out)
+    return write_barn_report(out, BarnPage(answer.runs, published, clearance_m, answer.without_way, links))
+
+
+def _pages_of(replayed: Mapping[K, Path], out: Path) -> dict[K, str]:
+    """Write the pages of run folders; where they lie, seen from the benchmark's own."""
     from pilotage.report.page import write_report
 
-    links = []
-    for name, runs in answer.runs.items():
-        for run in runs:
-            run_dir = replayed.get((name, run.world, run.trial))
-            if run_dir is not None:
-                links.append((name, run, write_report(run_dir).relative_to(out).as_posix()))
-    courses = answer.request.worlds
-    page = BarnPage(
-        answer.runs,
-        published,
-        {world.number: path_clearance_m(world) for world in courses},
-        answer.without_way,
-        links,
-    )
-    return write_barn_report(out, page)
+    return {key: write_report(run_dir).relative_to(out).as_posix() for key, run_dir in replayed.items()}
+
+
+def _once(names: tuple[str, ...], what: str) -> tuple[str, ...]:
+    if len(set(names)) < len(names):
+        raise InputError(f"{what}: expected every name once, found one twice")
+    return names
 
 
 def _print_table(answer: BarnAnswer) -> None:
@@ -244,3 +236,25 @@ def _print_courses(answer: CourseAnswer) -> None:
                 )
             )
     print_columns(rows)
+
+
+def bench_scen(
+    map_: Annotated[Path, typer.Argument(metavar="MAP", help="A MovingAI map file.")],
+    scenario: Annotated[Path, typer.Argument(metavar="SCEN", help="Its scenario file.")],
+    json: Json = False,
+) -> int:
+    """Solve every problem of a MovingAI scenario file and compare with its optimal lengths."""
+    from pilotage.experiments.scenario_benchmark import run_scenario
+
+    with stdout_for_json(json):
+        answer = run_scenario(map_, scenario)
+    if json:
+        print_json(answer)
+    else:
+        shown = {key: value for key, value in answer.items() if key != "failures"}
+        print_columns(
+            (key, f"{value:.4g}" if isinstance(value, float) else str(value)) for key, value in shown.items()
+        )
+        for failure in answer["failures"]:
+            print_line(f"missed: {failure}")
+    return 0 if answer["success"] else 1

@@ -1,7 +1,8 @@
-"""``pilotage components``: what can be named in a mission file or a study."""
+"""``pilotage missions``, ``components`` and ``schema``: what can be run, and named in a mission file."""
 
 from __future__ import annotations
 
+import json
 from typing import Annotated
 
 import typer
@@ -24,5 +25,23 @@ def components(
     rows = registered(name)
     if json:
         print_json({"components" if name is None or name in roles() else "parameters": rows})
+    else:
+        print_columns(rows)
+
+
+def schema(plugin: Plugins = None) -> None:  # noqa: ARG001 - loaded while the options are read
+    """Print the JSON schema of a mission file (for editors that check while one types)."""
+    from pilotage.experiments.catalogue import mission_schema
+
+    print(json.dumps(mission_schema(), indent=2))
+
+
+def missions(json: Json = False) -> None:
+    """List the missions that are shipped."""
+    from pilotage.experiments.catalogue import missions as shipped
+
+    rows = shipped()
+    if json:
+        print_json(dict(rows))
     else:
         print_columns(rows)

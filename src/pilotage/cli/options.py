@@ -70,3 +70,7 @@ Plugins: TypeAlias = Annotated[
 Seed: TypeAlias = Annotated[
     int | None, typer.Option(metavar="N", parser=parse_seed, help="Seed of every random draw.")
 ]
+WorkerCount: TypeAlias = Annotated[
+    int | None,
+    typer.Option("--workers", metavar="N", min=1, help="Processes on this machine; default: all cores."),
+]

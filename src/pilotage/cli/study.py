@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pilotage.cli.options import Json, Overrides, Plugins, parse_out
+from pilotage.cli.options import Json, Overrides, Plugins, WorkerCount, parse_out
 from pilotage.cli.output import print_columns, print_json, print_line, stdout_for_json
 from pilotage.cli.study_line import StudyLine
 from pilotage.core.errors import InputError
@@ -24,10 +24,6 @@ if TYPE_CHECKING:
 FAILED = 1
 TIMEOUT_S = 3600.0
 Trials = Annotated[int | None, typer.Option("--trials", metavar="N", min=1, help="Trials in every cell.")]
-WorkerCount = Annotated[
-    int | None,
-    typer.Option("--workers", metavar="N", min=1, help="Processes on this machine; default: all cores."),
-]
 Dask = Annotated[
     str | None, typer.Option("--dask", metavar="ADDRESS", help="A Dask scheduler to run on instead.")
 ]

@@ -15,6 +15,8 @@ SINGULAR = 1e-12
 """Least eigenvalue of the correlations, which are 1 on their diagonal; below, it is what rounding left."""
 SURE = 0.999
 """Share of the true positions that a consistent filter's ellipse of ``longest_outside_s`` holds."""
+LEVEL = 0.95
+"""Of a run's bands."""
 BOOTSTRAP_SEED = 20240607
 """Fixed: the band of a run must not change from one evaluation to the next."""
 
@@ -120,30 +122,8 @@ def _banded(name: str, band: Band) -> dict[str, object]:
     return {f"{name}_mean": band.mean, f"{name}_low": band.low, f"{name}_high": band.high}
 
 
-def fraction_in_band(values: FloatArray, dof: int, probability: float = 0.999) -> float:
-    """Share of the steps at which the mean over independent runs lies in its pointwise band.
-
-    At one step the runs are independent, so the sum of their NEES is chi-square with runs x dof degrees
-    of freedom, whatever the correlation from step to step (Bar-Shalom et al. 2001, section 5.4.2).
-
-    Parameters
-    ----------
-    values
-        (R, N) one row a run.
-    dof
-        Degrees of freedom of one value.
-    probability
-        Of the two-sided band.
-    """
-    runs = values.shape[0]
-    low = chi_square_quantile((1.0 - probability) / 2.0, runs * dof) / runs
-    high = chi_square_quantile((1.0 + probability) / 2.0, runs * dof) / runs
-    means = values.mean(axis=0)
-    return float(np.mean((means >= low) & (means <= high)))
-
-
-def correlated_mean(values: FloatArray, level: float = 0.95) -> Band:
-    """Mean of a correlated series with a band from the moving-block bootstrap.
+def correlated_mean(values: FloatArray) -> Band:
+    """Mean of a correlated series with a 95 % band from the moving-block bootstrap.
 
     Neighbouring steps are not independent, so a band from the number of steps would be far too narrow.
     The block is as long as twice the series' integrated autocorrelation time, at least the cube root of
@@ -168,7 +148,7 @@ def correlated_mean(values: FloatArray, level: float = 0.95) -> Band:
     blocks = -(-n // block)
     picks = rng.integers(0, block_means.shape[0], size=(RESAMPLES, blocks))
     means = block_means[picks].mean(axis=1)
-    low, high = np.quantile(means, [(1 - level) / 2, (1 + level) / 2])
+    low, high = np.quantile(means, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
     return Band(mean, float(low), float(high))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -10,10 +11,12 @@ from pilotage.core.angles import wrap_array_to_pi
 from pilotage.core.types import BoolArray, FloatArray
 from pilotage.evaluation.consistency import longest_outside_s, nees, nees_metrics, nis_metrics
 from pilotage.evaluation.finished import FinishedRun, RobotRun
-from pilotage.evaluation.plan_quality import clearance_m, smoothness
-from pilotage.evaluation.pose_errors import pose_errors
+from pilotage.evaluation.pose_errors import pose_errors, rms
 from pilotage.evaluation.shortest_path import ShortestPath, shortest_path
-from pilotage.evaluation.split_errors import split_errors
+from pilotage.kernels.bodies.outline import least_along
+from pilotage.maps.segment_map import SegmentMap
+from pilotage.models.footprint import Footprint
+from pilotage.stack.navigator.goal_config import Mode
 
 WRONG_M, WRONG_RAD = 0.5, 0.1
 """A pose farther from the truth than this is wrong."""
@@ -181,3 +184,75 @@ def _recovery(
         begin = float(trace["t_s"][since[-1]]) if since.size else 0.0
         metrics["found_after_s"] = float(trace["t_s"][found[-1]]) - begin
     return metrics
+
+
+NARROW_M = 0.5
+"""Ground is narrow where anything solid is nearer to the body's edge than this."""
+REACTIVE = (Mode.LATERAL, Mode.AVOID, Mode.ESCAPE)
+"""Modes in which something other than the path follower drives."""
+
+
+def split_errors(
+    trace: Mapping[str, FloatArray], distance_m: FloatArray, counted: BoolArray
+) -> dict[str, object]:
+    """Position RMSE by what drives the robot and by the room around it (night-watch report 5.1).
+
+    Parameters
+    ----------
+    distance_m
+        (N,) distance of the estimate from the truth at each step.
+    counted
+        (N,) which steps count.
+
+    Returns
+    -------
+    ``position_rmse_narrow_m``, ``position_rmse_open_m`` and, where the navigator tells what it does,
+    ``position_rmse_reactive_m``, ``position_rmse_following_m``; each only where a step counts for it.
+    """
+    narrow = trace["clearance_m"] < NARROW_M
+    parts = {"narrow": narrow, "open": ~narrow}
+    if "mode" in trace:
+        reactive = np.isin(trace["mode"], [float(mode) for mode in REACTIVE])
+        parts |= {"reactive": reactive, "following": trace["mode"] == float(Mode.FOLLOW)}
+    out: dict[str, object] = {}
+    for name, part in parts.items():
+        chosen = distance_m[counted & part]
+        if chosen.size:
+            out[f"position_rmse_{name}_m"] = rms(chosen)
+    return out
+
+
+CHECK_M = 0.01
+
+
+def smoothness(points_xy_m: FloatArray) -> float:
+    """Sum over the inner points of (2 (pi - angle) / (a + b))^2; 0 for a straight line.
+
+    ``angle`` lies between the segments of lengths a and b that meet at a point (the night-watch report's
+    third metric). Points that coincide with the one before are left out.
+    """
+    moved = np.ones(len(points_xy_m), dtype=np.bool_)
+    moved[1:] = np.hypot(*np.diff(points_xy_m, axis=0).T) > 0.0
+    points = points_xy_m[moved]
+    if len(points) < 3:
+        return 0.0
+    steps = np.diff(points, axis=0)
+    lengths = np.hypot(steps[:, 0], steps[:, 1])
+    directions = np.arctan2(steps[:, 1], steps[:, 0])
+    turns = np.abs((np.diff(directions) + math.pi) % (2.0 * math.pi) - math.pi)  # pi - angle
+    return float(np.sum((2.0 * turns / (lengths[:-1] + lengths[1:])) ** 2))
+
+
+def clearance_m(states: FloatArray, walls: SegmentMap, body: Footprint) -> float:
+    """Least distance of the body's edge from the walls along a path, looked at every centimetre.
+
+    Between two states (x, y, theta) the heading turns evenly.
+    """
+    lengths = np.hypot(*np.diff(states[:, :2], axis=0).T)
+    s = np.concatenate([[0.0], np.cumsum(lengths)])
+    count = max(2, math.ceil(float(s[-1]) / CHECK_M) + 1)
+    at = np.linspace(0.0, float(s[-1]), count)
+    columns = states[:, 0], states[:, 1], np.unwrap(states[:, 2])
+    fine = np.column_stack([np.interp(at, s, column) for column in columns])
+    both = np.ascontiguousarray(np.vstack([fine, states[:, :3]]))
+    return float(least_along(both, body.points_m, body.radius_m, walls.segments_m, walls.circles_m))

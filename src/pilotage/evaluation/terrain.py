@@ -8,12 +8,11 @@ from collections.abc import Mapping
 import numpy as np
 
 from pilotage.core.chi_square import chi_square_quantile
-from pilotage.core.types import BoolArray, FloatArray
+from pilotage.core.types import BoolArray, FloatArray, IntArray
 from pilotage.evaluation.driving import covariances, poses
 from pilotage.evaluation.finished import FinishedRun, RobotRun
 from pilotage.evaluation.position_region import bent_regions, squared_off
 from pilotage.evaluation.relief import relief
-from pilotage.evaluation.rover_metrics import root_determinant, stretches_without
 from pilotage.kernels.grids.blocked_distance import distance_to_blocked
 from pilotage.maps.occupancy_grid import OccupancyGrid, squared_distances
 from pilotage.maps.world_map import WorldMap
@@ -135,3 +134,21 @@ def hazard_distance_m(points_xy_m: FloatArray, grid: OccupancyGrid) -> FloatArra
     places = grid.places_at(points_xy_m[near])
     away[near] = distance_to_blocked(places, blocked, min(math.ceil(between[near].max()) + 1, reach))
     return away * grid.resolution_m
+
+
+STRETCH_M = 1000.0
+"""A way of this length without a landmark is a stretch to get over."""
+
+
+def stretches_without(seen: IntArray, step_m: FloatArray) -> list[tuple[int, int]]:
+    """Ways of more than ``STRETCH_M`` without a sighting: (first, last) step of each."""
+    blind = np.concatenate([[False], seen == 0, [False]])
+    edges = np.flatnonzero(np.diff(blind.astype(np.int8)))
+    driven_m = np.concatenate([[0.0], np.cumsum(step_m)])
+    pairs = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
+    return [(a, b - 1) for a, b in pairs if driven_m[b] - driven_m[a] > STRETCH_M]
+
+
+def root_determinant(covs: FloatArray) -> FloatArray:
+    """(T,) square root of the determinant of the position's covariance, in m^2."""
+    return np.sqrt(np.maximum(covs[:, 0, 0] * covs[:, 1, 1] - covs[:, 0, 1] ** 2, 0.0))

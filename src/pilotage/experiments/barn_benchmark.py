@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, fields, replace
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
@@ -13,15 +12,22 @@ from typing import Any
 import numpy as np
 
 from pilotage.core.errors import InputError
-from pilotage.core.plugins import named_plugins
 from pilotage.evaluation.barn import BarnRun, lane_within, summarize
 from pilotage.evaluation.least_time import time_bound_s
 from pilotage.experiments.barn_bounds import bounds_of, has_way
-from pilotage.experiments.build.build import build
 from pilotage.experiments.build.robots import footprint_of
-from pilotage.experiments.loop import run_loop
-from pilotage.experiments.mission import mission_of, read_mission
-from pilotage.experiments.run_pool import all_done
+from pilotage.experiments.course_driving import (
+    OnRun,
+    Values,
+    course_base,
+    drive_again,
+    drive_all,
+    drive_course_mission,
+    led_by,
+    row_of,
+    write_results,
+)
+from pilotage.experiments.mission import mission_of
 from pilotage.logs.barn import (
     GOAL_AHEAD_M,
     GOAL_TOLERANCE_M,
@@ -33,12 +39,10 @@ from pilotage.logs.barn import (
 from pilotage.missions.mission import Mission
 from pilotage.stack.control.local.drive import polygon_around
 
-MISSION = "barn-course"
-"""What the courses are put into: robot, sensors, stack, and how it is judged."""
+INTERVAL = frozenset({"metric_low", "metric_high"})
 DISTANCE_SCALE_STD, ANGLE_SCALE_STD = 0.01, 0.02
 """Errors of the odometry's scales, drawn for each run: tyre pressure, and skid steering on another floor."""
-Values = Mapping[str, Any]
-OnRun = Callable[[int, int], None]
+COLUMNS = ("controller", *(part.name for part in fields(BarnRun)), "metric")
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,11 +85,6 @@ class BarnAnswer:
 def bench_barn(request: BarnRequest, on_run: OnRun | None = None) -> BarnAnswer:
     """Drive every course with every controller.
 
-    Parameters
-    ----------
-    on_run
-        Called after each run with how many are done and how many there are.
-
     Raises
     ------
     InputError
@@ -104,31 +103,17 @@ def bench_barn(request: BarnRequest, on_run: OnRun | None = None) -> BarnAnswer:
             "bench barn: expected a course with a way through, found the robot wider than the gaps of all "
             f"{len(request.worlds)}; take a smaller robot.footprint"
         )
-    jobs = [
-        (world, trial, controller)
-        for world in open_worlds
-        for trial in range(request.trials)
-        for controller in request.controllers
-    ]
-    done: dict[str, list[BarnRun]] = {controller: [] for controller in request.controllers}
     # Without the courses, which each job brings its own of.
-    slim = replace(request, worlds=())
-    drive = partial(drive_world, slim, base)
-    for number, (job, run) in enumerate(all_done(drive, jobs, request.workers, "bench barn"), start=1):
-        done[job[2]].append(run)
-        if on_run is not None:
-            on_run(number, len(jobs))
+    drive = partial(drive_world, replace(request, worlds=()), base)
+    done = drive_all(
+        drive, open_worlds, request.trials, request.controllers, request.workers, "bench barn", on_run
+    )
     drove = {world.number for world in open_worlds}
     return BarnAnswer(
         request,
         {name: tuple(sorted(runs, key=lambda run: (run.world, run.trial))) for name, runs in done.items()},
         tuple(world.number for world in request.worlds if world.number not in drove),
     )
-
-
-def course_base() -> dict[str, Any]:
-    """What courses are put into, with the plugins that are loaded here: workers load them as well."""
-    return {**read_mission(MISSION), "plugins": list(named_plugins())}
 
 
 def course_mission(
@@ -169,36 +154,15 @@ def course_mission(
     return mission_of(base, overrides, settings=settings)
 
 
-def led_by(controller: str, overrides: tuple[str, ...]) -> tuple[str, ...]:
-    """The overrides on top of a controller, whose parameters they may set.
-
-    Raises
-    ------
-    InputError
-        Where they name another one.
-    """
-    if any(text.startswith("stack.local_controller.name=") for text in overrides):
-        raise InputError(
-            "--set stack.local_controller.name: expected no name, found one; say --controller NAME"
-        )
-    return (f"stack.local_controller.name={json.dumps(controller)}", *overrides)
-
-
 def drive_world(request: BarnRequest, base: Values, world: BarnWorld, trial: int, controller: str) -> BarnRun:
-    """Drive one course once, and judge it as the challenge does: first contact fails, so does time."""
-    experiment = build(course_mission(request, base, world, trial, controller))
-    finished = run_loop(experiment).finished
-    body, goal = experiment.simulator.bodies[0], experiment.mission.world.goal
-    assert goal is not None, "set above"
-    collided = body.collisions > 0
-    away_m = math.hypot(body.pose.x_m - goal.x_m, body.pose.y_m - goal.y_m)
-    success = not collided and away_m <= goal.tolerance_m
-    timeout = not (success or collided)
-    time_s = TIME_LIMIT_S if timeout else finished.duration_s
-    robot = experiment.team[0].known
+    """Drive one course once; whom the time runs out has taken all of it."""
+    driven = drive_course_mission(course_mission(request, base, world, trial, controller))
+    timeout = driven.ending[2]
+    time_s = TIME_LIMIT_S if timeout else driven.finished.duration_s
+    robot = driven.experiment.team[0].known
     limits = robot.motion.top_speed_m_s, robot.motion.braking_m_s2
     bound_s = _bound_s(world.circles_m.tobytes(), robot.footprint.inner_radius_m, *limits)
-    return BarnRun(world.number, trial, success, collided, timeout, time_s, world.optimal_time_s, bound_s)
+    return BarnRun(world.number, trial, *driven.ending, time_s, world.optimal_time_s, bound_s)
 
 
 @lru_cache(maxsize=512)
@@ -235,17 +199,7 @@ def summary_values(answer: BarnAnswer) -> dict[str, Any]:
 
 
 def _summary(runs: Sequence[BarnRun]) -> dict[str, Any]:
-    found = summarize(runs)
-    return {
-        "metric": found.metric,
-        "success": found.success,
-        "collision": found.collision,
-        "timeout": found.timeout,
-        "time_s": found.time_s,
-        "over_bound": found.over_bound,
-        "trials": found.trials,
-        "worlds": found.worlds,
-    }
+    return {key: value for key, value in asdict(summarize(runs)).items() if key not in INTERVAL}
 
 
 def first_worlds(worlds: Sequence[BarnWorld], count: int | None) -> tuple[BarnWorld, ...]:
@@ -255,11 +209,28 @@ def first_worlds(worlds: Sequence[BarnWorld], count: int | None) -> tuple[BarnWo
     return tuple(worlds[int(i)] for i in np.arange(count) * len(worlds) // count)
 
 
-def replay_missions(answer: BarnAnswer, controller: str, count: int) -> list[tuple[BarnRun, Mission]]:
-    """The worst runs of a controller as missions: each drives as it did."""
-    base = course_base()
-    worlds = {world.number: world for world in answer.request.worlds}
-    worst = sorted(answer.runs[controller], key=lambda run: (run.metric, -run.time_s))[:count]
-    return [
-        (run, course_mission(answer.request, base, worlds[run.world], run.trial, controller)) for run in worst
-    ]
+def write_barn(answer: BarnAnswer, folder: Path, replays: int) -> dict[tuple[str, int, int], Path]:
+    """Write rows and numbers into a folder, and drive the worst runs of each controller once more.
+
+    Returns
+    -------
+    Run folders by controller, world and trial.
+    """
+    request = answer.request
+    values = {
+        "controllers": list(request.controllers),
+        "trials": request.trials,
+        "seed": request.seed,
+        "overrides": list(request.overrides),
+        "without_way": list(answer.without_way),
+        "result": summary_values(answer),
+    }
+    rows = [(name, *row_of(run), run.metric) for name, runs in answer.runs.items() for run in runs]
+    write_results(folder, COLUMNS, rows, values)
+    base, worlds = course_base(), {world.number: world for world in request.worlds}
+    worst = {
+        (name, run.world, run.trial): course_mission(request, base, worlds[run.world], run.trial, name)
+        for name, runs in answer.runs.items()
+        for run in sorted(runs, key=lambda run: (run.metric, -run.time_s))[:replays]
+    }
+    return drive_again(worst, folder)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, fields, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -15,16 +15,20 @@ import numpy as np
 from pilotage.core.errors import InputError
 from pilotage.core.shown import visible
 from pilotage.evaluation.courses import CourseRun, summarize_courses
-from pilotage.experiments.barn_benchmark import course_base, led_by
-from pilotage.experiments.barn_files import REPLAYS, SUMMARY, finite
-from pilotage.experiments.build.build import build
 from pilotage.experiments.build.robots import footprint_of, motion_of
+from pilotage.experiments.course_driving import (
+    OnRun,
+    Values,
+    course_base,
+    drive_again,
+    drive_all,
+    drive_course_mission,
+    led_by,
+    row_of,
+    write_results,
+)
 from pilotage.experiments.course_families import DRAWN, Course, Driver, make_course_of
-from pilotage.experiments.loop import run_loop
 from pilotage.experiments.mission import mission_of
-from pilotage.experiments.result_rows import write_rows
-from pilotage.experiments.run import run_mission
-from pilotage.experiments.run_pool import all_done
 from pilotage.missions.mission import Mission
 from pilotage.stack.control.local.drive import polygon_around
 from pilotage.stack.control.local.role import LOCAL_CONTROLLERS
@@ -32,22 +36,7 @@ from pilotage.stack.control.local.role import LOCAL_CONTROLLERS
 TIME_LIMIT_S = 100.0
 AMONG_PEOPLE: Mapping[str, Any] = {"ground.movers.enabled": True, "ground.fade_hits": 60}
 """What controllers with a rolling ground are told of a place: that somebody may move there."""
-COLUMNS = (
-    "controller",
-    "family",
-    "course",
-    "trial",
-    "success",
-    "collision",
-    "timeout",
-    "time_s",
-    "bound_s",
-    "empty_s",
-    "people_collisions",
-    "people_touches",
-    "closest_m",
-    "near_share",
-)
+COLUMNS = ("controller", *(part.name for part in fields(CourseRun)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,9 +72,7 @@ class CourseAnswer:
     without_way: Mapping[str, int]
 
 
-def bench_controllers(
-    request: CourseRequest, on_run: Callable[[int, int], None] | None = None
-) -> CourseAnswer:
+def bench_controllers(request: CourseRequest, on_run: OnRun | None = None) -> CourseAnswer:
     """Drive every course with every controller.
 
     Raises
@@ -117,18 +104,15 @@ def bench_controllers(
     first = next(iter(courses.values()))
     for controller in request.controllers:
         course_run_mission(request, base, first, 0, controller)
-    jobs = [
-        (course, trial, controller)
-        for course in courses.values()
-        for trial in range(request.trials)
-        for controller in request.controllers
-    ]
-    done: dict[str, list[CourseRun]] = {controller: [] for controller in request.controllers}
-    drive = partial(drive_course, request, base)
-    for count, (job, run) in enumerate(all_done(drive, jobs, request.workers, "bench controllers"), start=1):
-        done[job[2]].append(run)
-        if on_run is not None:
-            on_run(count, len(jobs))
+    done = drive_all(
+        partial(drive_course, request, base),
+        list(courses.values()),
+        request.trials,
+        request.controllers,
+        request.workers,
+        "bench controllers",
+        on_run,
+    )
     place = {family: index for index, family in enumerate(request.families)}
     return CourseAnswer(
         request,
@@ -143,7 +127,7 @@ def bench_controllers(
 
 def course_run_mission(
     request: CourseRequest,
-    base: Mapping[str, Any],
+    base: Values,
     course: Course,
     trial: int,
     controller: str,
@@ -173,52 +157,25 @@ def course_run_mission(
 
 
 def drive_course(
-    request: CourseRequest, base: Mapping[str, Any], course: Course, trial: int, controller: str
+    request: CourseRequest, base: Values, course: Course, trial: int, controller: str
 ) -> CourseRun:
     """Drive once, and where there are people once more without them."""
-    run = _driven(request, base, course, trial, controller, empty=False)
+    driven = drive_course_mission(course_run_mission(request, base, course, trial, controller))
+    where = course.family, course.number, trial
+    run = CourseRun(*where, *driven.ending, driven.finished.duration_s, course.bound_s)
+    met = driven.finished.robots[0].encounters
+    if met is not None:
+        run = replace(
+            run,
+            people_collisions=met.collisions,
+            people_touches=met.touches,
+            closest_m=met.closest_m,
+            near_share=met.near_share,
+        )
     if course.people:
-        alone = _driven(request, base, course, trial, controller, empty=True)
-        run = replace(run, empty_s=alone.time_s if alone.success else math.nan)
+        alone = drive_course_mission(course_run_mission(request, base, course, trial, controller, empty=True))
+        run = replace(run, empty_s=alone.finished.duration_s if alone.success else math.nan)
     return run
-
-
-def _driven(
-    request: CourseRequest,
-    base: Mapping[str, Any],
-    course: Course,
-    trial: int,
-    controller: str,
-    *,
-    empty: bool,
-) -> CourseRun:
-    experiment = build(course_run_mission(request, base, course, trial, controller, empty=empty))
-    finished = run_loop(experiment).finished
-    body, goal = experiment.simulator.bodies[0], experiment.mission.world.goal
-    assert goal is not None, "set above"
-    there = math.hypot(body.pose.x_m - goal.x_m, body.pose.y_m - goal.y_m) <= goal.tolerance_m
-    collided = body.collisions > 0
-    success = there and not collided
-    met = finished.robots[0].encounters
-    run = CourseRun(
-        course.family,
-        course.number,
-        trial,
-        success,
-        collided,
-        not (success or collided),
-        finished.duration_s,
-        course.bound_s,
-    )
-    if met is None:
-        return run
-    return replace(
-        run,
-        people_collisions=met.collisions,
-        people_touches=met.touches,
-        closest_m=met.closest_m,
-        near_share=met.near_share,
-    )
 
 
 def answer_values(answer: CourseAnswer) -> dict[str, Any]:
@@ -246,32 +203,20 @@ def write_answer(answer: CourseAnswer, folder: Path, replays: int) -> dict[tuple
     -------
     Run folders by controller, family, course and trial.
     """
-    import json
-
-    folder.mkdir(parents=True, exist_ok=True)
-    rows = [(name, *_row(run)) for name, runs in answer.runs.items() for run in runs]
-    write_rows(folder, COLUMNS, rows)
-    request = answer.request
+    request, base = answer.request, course_base()
     asked = {key: value for key, value in asdict(request).items() if key != "workers"}
-    values = {**asked, "result": finite(answer_values(answer))}
-    (folder / SUMMARY).write_text(json.dumps(values, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-    made = {}
-    base = course_base()
-    for name, runs in answer.runs.items():
-        for run in sorted(runs, key=worst_first)[:replays]:
-            course = answer.courses[run.family, run.course]
-            result = run_mission(
-                course_run_mission(request, base, course, run.trial, name), out=folder / REPLAYS
-            )
-            assert result.run_dir is not None, "it is saved"
-            made[name, run.family, run.course, run.trial] = result.run_dir
-    return made
+    rows = [(name, *row_of(run)) for name, runs in answer.runs.items() for run in runs]
+    write_results(folder, COLUMNS, rows, {**asked, "result": answer_values(answer)})
+    worst = {
+        (name, run.family, run.course, run.trial): course_run_mission(
+            request, base, answer.courses[run.family, run.course], run.trial, name
+        )
+        for name, runs in answer.runs.items()
+        for run in sorted(runs, key=worst_first)[:replays]
+    }
+    return drive_again(worst, folder)
 
 
 def worst_first(run: CourseRun) -> tuple[bool, bool, float]:
     """Collisions first, then what was not reached, then the slowest against its bound."""
     return not run.collision, run.success, -run.time_s / run.bound_s
-
-
-def _row(run: CourseRun) -> tuple[str | int | float, ...]:
-    return tuple(int(value) if isinstance(value, bool) else value for value in asdict(run).values())

@@ -15,8 +15,9 @@ from pilotage.core.config import Config, validate
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.evaluation.relief import relief
+from pilotage.experiments.planning import split_overrides
 from pilotage.experiments.rehearsal import rehearsed
-from pilotage.experiments.values import parse_override, parse_yaml, read_text
+from pilotage.experiments.values import parse_yaml, read_text
 from pilotage.maps.elevation import ElevationModel
 from pilotage.maps.elevation_file import HEIGHTS_ALONE, read_elevation
 from pilotage.maps.grid_file import GRID_SUFFIXES, read_grid
@@ -92,7 +93,7 @@ def plan_on_grid(
         Where the map, the planner or a parameter is not what it should be, or start or goal lies outside
         the map or on blocked ground.
     """
-    own, of_map = _split(overrides)
+    own, of_map = split_overrides(overrides, "map")
     settings = validate(GridMapConfig, of_map, "map")
     config = GRID_PLANNERS.configure(planner, own, f"planner '{planner}'")
     ground = _read(path, settings, slope_limit_deg)
@@ -168,25 +169,6 @@ def _read(path: Path, settings: GridMapConfig, slope_limit_deg: float | None) ->
         require_memory(20 * elevation.elevation_m.size, f"{path}: costs by slope")
         factors = elevation.cost_factors(settings.slope_that_doubles_deg)
     return _Ground(elevation.hazards(slope_limit_deg), elevation, factors)
-
-
-def _split(overrides: Sequence[str]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Sort overrides into the planner's parameters and the map's."""
-    own: dict[str, Any] = {}
-    of_map: dict[str, Any] = {}
-    for override in overrides:
-        parts, value = parse_override(override)
-        if parts[:2] == ["stack", "planner"]:
-            parts = parts[1:]
-        if parts[0] == "map" and len(parts) == 2:
-            of_map[parts[1]] = value
-        elif parts[0] == "planner" and len(parts) == 2:
-            own[parts[1]] = value
-        elif len(parts) == 1:
-            own[parts[0]] = value
-        else:
-            raise InputError(f"--set '{override}': expected a parameter of the planner, or map.parameter")
-    return own, of_map
 
 
 def free_cell(

@@ -34,7 +34,7 @@ class Run:
     people: PeopleTrail
 
 
-def simulate(mission: Mission, on_progress: OnProgress | None = None) -> Run:
+def simulate(mission: Mission) -> Run:
     """Build a mission and step it to its end.
 
     Raises
@@ -42,7 +42,7 @@ def simulate(mission: Mission, on_progress: OnProgress | None = None) -> Run:
     InputError
         Where the mission cannot be built.
     """
-    return run_loop(build(mission), on_progress)
+    return run_loop(build(mission))
 
 
 def run_loop(experiment: Experiment, on_progress: OnProgress | None = None) -> Run:

@@ -62,7 +62,9 @@ def plan_on_map(
     floor = load_chart(map_name_or_path)
     _check_on_map("--start", start, floor)
     _check_on_map("--goal", goal, floor)
-    own, smoothing, smoother_name = _split(overrides, SMOOTHER)
+    own, smoothing = split_overrides(overrides, "smoother")
+    # ``smoother=none`` says its name alone.
+    smoother_name = str(own.pop("smoother", smoothing.pop("name", SMOOTHER)))
     config = PLANNERS.configure(planner, own, f"planner '{planner}'")
     smoother_config = SMOOTHERS.configure(smoother_name, smoothing, f"smoother '{smoother_name}'")
     to = Goal(goal[0], goal[1], wrap_to_pi(goal[2]) if len(goal) > 2 else None)
@@ -130,25 +132,23 @@ def _reason(result: PlanResult, planned: PlannedPath | None) -> str:
     return f"{result.status}: {length} after {result.iterations} iterations{smoothed}"
 
 
-def _split(overrides: Sequence[str], name: str) -> tuple[dict[str, Any], dict[str, Any], str]:
-    """Sort overrides into the planner's parameters, the smoother's, and the smoother's name."""
+def split_overrides(overrides: Sequence[str], other: str) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Sort overrides into the planner's parameters, which may be told alone, and those of ``other``."""
     own: dict[str, Any] = {}
-    smoothing: dict[str, Any] = {}
+    others: dict[str, Any] = {}
     for override in overrides:
         parts, value = parse_override(override)
         if parts[:2] in (["stack", "planner"], ["stack", "smoother"]):
             parts = parts[1:]
-        if parts in (["smoother"], ["smoother", "name"]):
-            name = str(value)
-        elif parts[0] == "smoother" and len(parts) == 2:
-            smoothing[parts[1]] = value
+        if parts[0] == other and len(parts) == 2:
+            others[parts[1]] = value
         elif parts[0] == "planner" and len(parts) == 2:
             own[parts[1]] = value
         elif len(parts) == 1:
             own[parts[0]] = value
         else:
-            raise InputError(f"--set '{override}': expected a parameter of the planner or of the smoother")
-    return own, smoothing, name
+            raise InputError(f"--set '{override}': expected a parameter of the planner, or {other}.PARAMETER")
+    return own, others
 
 
 def _check_on_map(option: str, place: Sequence[float], floor: WorldMap) -> None:

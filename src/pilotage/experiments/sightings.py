@@ -70,7 +70,7 @@ class Sightings:
                 scan_t_s=np.array(self._scan_t_s),
                 ranges_m=np.stack(self._scans).astype(np.float64),
                 angles_rad=self._config.beam_angles_rad()[:: self._stride],
-                mount=np.array([mount.x_m, mount.y_m, mount.theta_rad]),
+                mount=mount.as_array(),
                 max_range_m=self._config.max_range_m,
             )
         if self._beacons is not None:

@@ -147,22 +147,15 @@ class _LandmarkFilter:
         bearings = given.array("bearings_rad", _several(bearings_rad), len(numbers))
         known = self.landmarks
         assert isinstance(known, Landmarks), "settled at construction"
-        order = np.argsort(known.ids)
         pose, cov = np.array(self.pose), np.array(self.cov)
-        nis, outcome = np.empty(numbers.shape), np.empty(numbers.shape, dtype=np.int64)
-        type(self)._update(
+        _, nis, outcome = type(self)._update(
             pose,
             cov,
-            numbers,
-            ranges,
-            bearings,
-            np.ascontiguousarray(known.ids[order]),
-            np.ascontiguousarray(known.points_xy_m[order]),
+            sighting.Seen(numbers, ranges, bearings),
+            known.by_id(),
             np.array(self.mount),
             np.diag([self.range_var_m2, self.bearing_var_rad2]),
             math.inf if self.gate == 1.0 else chi_square_quantile(self.gate, 2),
-            nis,
-            outcome,
         )
         return replace(self, pose=pose, cov=cov, nis=nis, accepted=outcome == sighting.OUTCOME_ACCEPTED)
 

@@ -219,8 +219,8 @@ def check_size(table: Table, columns: Sequence[str], first: int = 1, most: float
         )
 
 
-def check_gaps(table: Table, t_s: FloatArray, factor: float = 1.5) -> None:
-    """Refuse a step in time longer than ``factor`` times the usual one: something was lost there.
+def check_gaps(table: Table, t_s: FloatArray) -> None:
+    """Refuse a step in time half as long again as the usual one: something was lost there.
 
     Raises
     ------
@@ -231,7 +231,7 @@ def check_gaps(table: Table, t_s: FloatArray, factor: float = 1.5) -> None:
         return
     steps = np.diff(t_s)
     usual = float(np.median(steps))
-    wide = np.flatnonzero(steps > factor * usual)
+    wide = np.flatnonzero(steps > 1.5 * usual)
     if wide.size:
         row = int(wide[0]) + 1
         raise InputError(

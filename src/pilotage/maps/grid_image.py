@@ -103,9 +103,7 @@ def write_grey(path: Path, grey: GreyArray, alpha: ByteArray | None = None) -> N
     image.save(path, compress_level=1)
 
 
-def read_hazard_image(
-    path: Path, resolution_m: float, origin: Pose2 = CORNER, size: tuple[int, int] | None = None
-) -> OccupancyGrid:
+def read_hazard_image(path: Path, resolution_m: float, origin: Pose2 = CORNER) -> OccupancyGrid:
     """Read an obstacle map where white is an obstacle and black is free ground.
 
     Raises
@@ -113,6 +111,6 @@ def read_hazard_image(
     InputError
         As ``read_grey``, and for a resolution that is not above 0.
     """
-    grey, _ = read_grey(path, size)
+    grey, _ = read_grey(path)
     cells = np.where(as_bytes(grey) >= WHITE_FROM, np.int8(OCCUPIED), np.int8(FREE))
     return OccupancyGrid(cells, resolution_m, origin)

@@ -8,6 +8,7 @@ import numpy as np
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, IntArray
+from pilotage.kernels.filters.sighting import Known
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,3 +36,8 @@ class Landmarks:
 
     def __len__(self) -> int:
         return int(self.ids.shape[0])
+
+    def by_id(self) -> Known:
+        """In the order of their ids, as filters look them up."""
+        order = np.argsort(self.ids)
+        return Known(self.ids[order], self.points_xy_m[order])

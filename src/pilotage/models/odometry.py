@@ -5,32 +5,12 @@ from __future__ import annotations
 import math
 from enum import StrEnum
 
-import numpy as np
-
-from pilotage.core.types import FloatArray, Pose2
-from pilotage.kernels.geometry import motion
-
 
 class OdometryModel(StrEnum):
     """The exact arc, or the night-watch report's mid-angle model (its eq. 1-3)."""
 
     EXACT_ARC = "exact-arc"
     MID_ANGLE = "mid-angle"
-
-
-def move(pose: Pose2, distance_m: float, angle_rad: float, model: OdometryModel) -> Pose2:
-    """Return the pose after driving ``distance_m`` along an arc that turns by ``angle_rad``."""
-    step = motion.exact_arc if model is OdometryModel.EXACT_ARC else motion.mid_angle
-    return Pose2(*step(pose.x_m, pose.y_m, pose.theta_rad, distance_m, angle_rad))
-
-
-def move_jacobians(
-    pose: Pose2, distance_m: float, angle_rad: float, model: OdometryModel
-) -> tuple[FloatArray, FloatArray]:
-    """Return the Jacobians of ``move``: F (3, 3) in the pose, G (3, 2) in distance and angle."""
-    F, G = np.empty((3, 3)), np.empty((3, 2))
-    motion.arc_jacobians(pose.theta_rad, distance_m, angle_rad, model is OdometryModel.EXACT_ARC, F, G)
-    return F, G
 
 
 def increment_variances(

@@ -8,7 +8,7 @@ import numpy as np
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray, IntArray
-from pilotage.kernels.slam.edges import squared_errors
+from pilotage.kernels.slam.edges import Edges, squared_errors
 
 LARGEST = 1e9
 """Metres or radians beyond which no pose is."""
@@ -78,9 +78,14 @@ class PoseGraph:
     def __len__(self) -> int:
         return int(self.poses.shape[0])
 
+    @property
+    def edges(self) -> Edges:
+        """The edges as the kernels take them."""
+        return Edges(self.i, self.j, self.measurements, self.information)
+
     def squared_errors(self) -> FloatArray:
         """Return (M,) each edge's squared Mahalanobis distance; chi-square with 3 degrees of freedom."""
-        return squared_errors(self.poses, self.i, self.j, self.measurements, self.information)
+        return squared_errors(self.poses, self.edges)
 
     def components(self) -> IntArray:
         """Return (N,) the least pose of each pose's connected component."""

@@ -10,9 +10,9 @@ from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray, IntArray
 from pilotage.kernels.slam.block_cholesky import factorize
 from pilotage.kernels.slam.covariances import column_products, inverse_blocks, inverse_columns, joint_products
-from pilotage.kernels.slam.edges import SQUARE, normal_equations
+from pilotage.kernels.slam.edges import SQUARE, Doubts, Pattern, normal_equations
 from pilotage.models.pose_graph import PoseGraph
-from pilotage.models.pose_graph_solver import Elimination, check_fixed, eliminate
+from pilotage.models.pose_graph_solver import check_fixed, eliminate
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +56,7 @@ class PoseCovariances:
     """
 
     graph: PoseGraph
-    plan: Elimination
+    plan: Pattern
     diagonal: FloatArray
     below: FloatArray
 
@@ -121,22 +121,9 @@ def covariances(
         information = information * weights[:, None, None]
     n = plan.column_start.size - 1
     diagonal, below, right = np.empty((n, 9)), np.empty((plan.rows.size, 9)), np.empty((n, 3))
-    normal_equations(
-        graph.poses,
-        graph.i,
-        graph.j,
-        graph.measurements,
-        information,
-        SQUARE,
-        1.0,
-        np.zeros(graph.i.size, dtype=np.bool_),
-        plan.column,
-        plan.places,
-        plan.turned,
-        diagonal,
-        below,
-        right,
-    )
+    edges = graph.edges._replace(information=information)
+    no_doubts = Doubts(SQUARE, 1.0, np.zeros(graph.i.size, dtype=np.bool_))
+    normal_equations(graph.poses, edges, no_doubts, plan, diagonal, below, right)
     done = factorize(plan.column_start, plan.rows, diagonal, below)
     if done != n:
         pose = int(np.flatnonzero(plan.column == -1 - done)[0])

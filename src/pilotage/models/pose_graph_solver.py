@@ -9,7 +9,7 @@ import numpy as np
 
 from pilotage.core.angles import wrap_array_to_pi
 from pilotage.core.errors import InputError
-from pilotage.core.types import BoolArray, FloatArray, IntArray
+from pilotage.core.types import BoolArray, FloatArray
 from pilotage.kernels.slam import edges as kinds
 from pilotage.kernels.slam import levenberg_marquardt as lm
 from pilotage.kernels.slam.block_cholesky import pattern_places
@@ -62,20 +62,6 @@ STATUS = {
 
 
 @dataclass(frozen=True, slots=True)
-class Elimination:
-    """Order of elimination of a pose graph and its factor's pattern; good for all poses of the same edges.
-
-    ``column`` (N,) is each pose's place in the order, -1 for a fixed one; the rest as in ``kernels.slam``.
-    """
-
-    column: IntArray
-    column_start: IntArray
-    rows: IntArray
-    places: IntArray
-    turned: IntArray
-
-
-@dataclass(frozen=True, slots=True)
 class PoseGraphSolution:
     """The result of a search.
 
@@ -103,7 +89,7 @@ class PoseGraphSolution:
     weights: FloatArray
 
 
-def eliminate(graph: PoseGraph, fixed: BoolArray) -> Elimination:
+def eliminate(graph: PoseGraph, fixed: BoolArray) -> kinds.Pattern:
     """Find an order of elimination with little fill, and the factor's pattern."""
     free = np.flatnonzero(~fixed)
     variable = np.full(len(graph), -1, dtype=np.int64)
@@ -113,7 +99,7 @@ def eliminate(graph: PoseGraph, fixed: BoolArray) -> Elimination:
     places, turned = pattern_places(order, column_start, rows, i, j)
     column = np.full(len(graph), -1, dtype=np.int64)
     column[free[order]] = np.arange(free.size)
-    return Elimination(column, column_start, rows, places, turned)
+    return kinds.Pattern(column, column_start, rows, places, turned)
 
 
 def optimize(
@@ -157,31 +143,29 @@ def optimize(
         raise InputError("optimize: expected scale, tolerance and most_iterations above 0")
     if loss is Loss.SQUARE:
         doubted = np.zeros_like(doubted)
-    plan = eliminate(graph, fixed)
-    problem = graph.i, graph.j, graph.measurements, graph.information
-    robust = KERNEL_LOSS[loss], float(scale), doubted
-    pattern = plan.column, plan.column_start, plan.rows, plan.places, plan.turned
+    pattern, edges = eliminate(graph, fixed), graph.edges
+    doubts = kinds.Doubts(KERNEL_LOSS[loss], float(scale), doubted)
     poses = graph.poses
     if start is not Start.GIVEN:
-        chordal, solved = chordal_poses(poses, *problem, *pattern)
+        chordal, solved = chordal_poses(poses, edges, pattern)
         if solved and (
             start is Start.CHORDAL
-            or objective(squared_errors(chordal, *problem), *robust)
-            < objective(squared_errors(poses, *problem), *robust)
+            or objective(squared_errors(chordal, edges), doubts)
+            < objective(squared_errors(poses, edges), doubts)
         ):
             poses = chordal
     poses, value, iterations, status = lm.levenberg_marquardt(
-        poses, *problem, *robust, *pattern, float(tolerance), int(most_iterations)
+        poses, edges, doubts, pattern, float(tolerance), int(most_iterations)
     )
     poses[:, 2] = wrap_array_to_pi(poses[:, 2])
-    squares = squared_errors(poses, *problem)
+    squares = squared_errors(poses, edges)
     return PoseGraphSolution(
         replace(graph, poses=poses),
         STATUS[status],
         float(value),
         int(iterations),
         squares,
-        kinds.weights(squares, *robust),
+        kinds.weights(squares, doubts),
     )
 
 

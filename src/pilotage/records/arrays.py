@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,9 @@ from pilotage.core.limits import MB, limit
 from pilotage.core.misfit import LARGEST
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.records.numbers import FARTHEST_M
-from pilotage.records.reading import is_there
+from pilotage.records.reading import broken, is_there
+
+T = TypeVar("T")
 
 ARCHIVE_BYTES = 128 * MB
 """All arrays of an archive of a run; the largest that a run leaves are some megabytes."""
@@ -128,3 +130,21 @@ def read_arrays(path: Path, most: int = ARCHIVE_BYTES) -> Arrays | None:
         return Arrays(read_npz(path, "arrays", most), limit(most))
     except InputError as error:
         raise InputError(f"{error}; as it cannot be read, make it again") from None
+
+
+def read_record(path: Path, tell: Callable[[Arrays], T], otherwise: T) -> T:
+    """What an archive of a run's folder tells; ``otherwise`` where there is none.
+
+    Raises
+    ------
+    InputError
+        One line, where the file is no archive or an array is not what it should be: ``tell`` raises a
+        ValueError then.
+    """
+    arrays = read_arrays(path)
+    if arrays is None:
+        return otherwise
+    try:
+        return tell(arrays)
+    except ValueError as error:
+        raise broken(path, error) from None

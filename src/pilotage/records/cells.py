@@ -14,8 +14,8 @@ from pilotage.maps.cell_map_text import format_cell_map
 from pilotage.maps.grid_image import write_grey
 from pilotage.maps.occupancy_grid import OccupancyGrid
 from pilotage.maps.ros_map import RosMap, write_ros_map
-from pilotage.records.arrays import Arrays, read_arrays, write_arrays
-from pilotage.records.reading import broken, clean_text
+from pilotage.records.arrays import Arrays, read_record, write_arrays
+from pilotage.records.reading import clean_text
 from pilotage.records.world import World
 
 CELLS_FILE, TEXT_FILE, PICTURE_FILE, ROS_FILE = "cells.npz", "cells.txt", "cells.png", "map.yaml"
@@ -105,19 +105,9 @@ def write_cells(folder: Path, sheet: SheetData) -> None:
 def read_cells(folder: Path, world: World) -> SheetData | None:
     """Read the cell maps of a run whose world has been read; None where the run was not on a sheet.
 
-    Raises
-    ------
-    InputError
-        One line, where the file is no archive or an array is not what it should be.
+    InputError as ``read_record``.
     """
-    path = folder / CELLS_FILE
-    arrays = read_arrays(path)
-    if arrays is None:
-        return None
-    try:
-        return _sheet(arrays, world)
-    except ValueError as error:
-        raise broken(path, error) from None
+    return read_record(folder / CELLS_FILE, lambda arrays: _sheet(arrays, world), None)
 
 
 def _sheet(arrays: Arrays, world: World) -> SheetData:

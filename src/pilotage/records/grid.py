@@ -9,9 +9,9 @@ import numpy as np
 from pilotage.core.types import Pose2
 from pilotage.maps.occupancy_grid import OCCUPIED, UNKNOWN, OccupancyGrid
 from pilotage.maps.ros_map import read_ros_map
-from pilotage.records.arrays import read_arrays, write_arrays
+from pilotage.records.arrays import Arrays, read_record, write_arrays
 from pilotage.records.numbers import FARTHEST_M
-from pilotage.records.reading import broken, is_there
+from pilotage.records.reading import is_there
 
 GRID_FILE = "grid.npz"
 MOST_CELLS = 64_000_000
@@ -34,27 +34,15 @@ def read_own_map(folder: Path) -> OccupancyGrid | None:
 
 
 def read_grid_layer(folder: Path) -> OccupancyGrid | None:
-    """Read the grid; None where the world has none.
+    """Read the grid; None where the world has none; InputError as ``read_record``."""
+    return read_record(folder / GRID_FILE, _grid, None)
 
-    Raises
-    ------
-    InputError
-        One line, where the file is no archive or an array is not what it should be.
-    """
-    path = folder / GRID_FILE
-    arrays = read_arrays(path)
-    if arrays is None:
-        return None
-    try:
-        cells, origin = arrays.ints("cells", -1, -1), arrays.floats("origin", 3)
-        resolution_m = arrays.scalar("resolution_m")
-        if not 0 < cells.size <= MOST_CELLS or int(cells.min()) < UNKNOWN or int(cells.max()) > OCCUPIED:
-            raise ValueError(f"cells: expected numbers from {UNKNOWN} to {OCCUPIED}")
-        if (
-            not (np.abs(origin) <= FARTHEST_M).all()
-            or not 0.0 < resolution_m * max(cells.shape) <= FARTHEST_M
-        ):
-            raise ValueError("origin, resolution_m: expected a place on a map and a length above 0")
-        return OccupancyGrid(cells.astype(np.int8), resolution_m, Pose2.from_array(origin))
-    except ValueError as error:
-        raise broken(path, error) from None
+
+def _grid(arrays: Arrays) -> OccupancyGrid:
+    cells, origin = arrays.ints("cells", -1, -1), arrays.floats("origin", 3)
+    resolution_m = arrays.scalar("resolution_m")
+    if not 0 < cells.size <= MOST_CELLS or int(cells.min()) < UNKNOWN or int(cells.max()) > OCCUPIED:
+        raise ValueError(f"cells: expected numbers from {UNKNOWN} to {OCCUPIED}")
+    if not (np.abs(origin) <= FARTHEST_M).all() or not 0.0 < resolution_m * max(cells.shape) <= FARTHEST_M:
+        raise ValueError("origin, resolution_m: expected a place on a map and a length above 0")
+    return OccupancyGrid(cells.astype(np.int8), resolution_m, Pose2.from_array(origin))

@@ -8,9 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from pilotage.core.types import FloatArray, IntArray
-from pilotage.records.arrays import read_arrays, write_arrays
+from pilotage.records.arrays import Arrays, read_record, write_arrays
 from pilotage.records.numbers import FARTHEST_M
-from pilotage.records.reading import broken
 
 PATROL_FILE = "patrol.npz"
 
@@ -56,44 +55,35 @@ def write_patrol(folder: Path, patrol: PatrolRecord) -> None:
 
 
 def read_patrol(folder: Path) -> PatrolRecord | None:
-    """Read the patrol; None where there is no such file.
+    """Read the patrol; None where there is no such file; InputError as ``read_record``."""
+    return read_record(folder / PATROL_FILE, _record, None)
 
-    Raises
-    ------
-    InputError
-        One line, where the file is no archive or an array is not what it should be.
-    """
-    path = folder / PATROL_FILE
-    arrays = read_arrays(path)
-    if arrays is None:
-        return None
-    try:
-        vertices = arrays.floats("vertices_xy_m", -1, 2)
-        count = len(vertices)
-        cells = arrays.floats("cells_xy_m", -1, 2)
-        record = PatrolRecord(
-            vertices,
-            arrays.ints("edges", -1, 2),
-            arrays.ints("tour", -1),
-            arrays.floats("visits", -1, 3),
-            arrays.floats("idleness_s", count),
-            arrays.floats("series", -1, 6),
-            cells,
-            arrays.scalar("cell_m"),
-            arrays.floats("age_s", len(cells)),
-            arrays.floats("last_seen_s", len(cells)),
-        )
-        if count == 0 or not (np.abs(np.concatenate([vertices, cells])) <= FARTHEST_M).all():
-            raise ValueError("vertices_xy_m, cells_xy_m: expected places on a map")
-        for name in ("edges", "tour"):
-            named = getattr(record, name)
-            if named.size and not (named.min() >= 0 and named.max() < count):
-                raise ValueError(f"{name}: expected vertices from 0 to {count - 1}")
-        visited = record.visits[:, 1]
-        if not ((visited >= 0) & (visited < count)).all() or not np.isfinite(record.visits).all():
-            raise ValueError(f"visits: expected vertices from 0 to {count - 1}")
-        if not 0.0 < record.cell_m <= FARTHEST_M:
-            raise ValueError("cell_m: expected a side above 0 m")
-    except ValueError as error:
-        raise broken(path, error) from None
+
+def _record(arrays: Arrays) -> PatrolRecord:
+    vertices = arrays.floats("vertices_xy_m", -1, 2)
+    count = len(vertices)
+    cells = arrays.floats("cells_xy_m", -1, 2)
+    record = PatrolRecord(
+        vertices,
+        arrays.ints("edges", -1, 2),
+        arrays.ints("tour", -1),
+        arrays.floats("visits", -1, 3),
+        arrays.floats("idleness_s", count),
+        arrays.floats("series", -1, 6),
+        cells,
+        arrays.scalar("cell_m"),
+        arrays.floats("age_s", len(cells)),
+        arrays.floats("last_seen_s", len(cells)),
+    )
+    if count == 0 or not (np.abs(np.concatenate([vertices, cells])) <= FARTHEST_M).all():
+        raise ValueError("vertices_xy_m, cells_xy_m: expected places on a map")
+    for name in ("edges", "tour"):
+        named = getattr(record, name)
+        if named.size and not (named.min() >= 0 and named.max() < count):
+            raise ValueError(f"{name}: expected vertices from 0 to {count - 1}")
+    visited = record.visits[:, 1]
+    if not ((visited >= 0) & (visited < count)).all() or not np.isfinite(record.visits).all():
+        raise ValueError(f"visits: expected vertices from 0 to {count - 1}")
+    if not 0.0 < record.cell_m <= FARTHEST_M:
+        raise ValueError("cell_m: expected a side above 0 m")
     return record

@@ -8,9 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from pilotage.core.types import FloatArray
-from pilotage.records.arrays import read_arrays, write_arrays
+from pilotage.records.arrays import Arrays, read_record, write_arrays
 from pilotage.records.numbers import FARTHEST_M
-from pilotage.records.reading import broken
 
 PEOPLE_FILE = "people.npz"
 
@@ -41,25 +40,16 @@ def write_people(folder: Path, people: PeopleTracks) -> None:
 
 
 def read_people_tracks(folder: Path) -> PeopleTracks:
-    """Read the tracks; none where there is no such file.
+    """Read the tracks; none where there is no such file; InputError as ``read_record``."""
+    return read_record(folder / PEOPLE_FILE, _tracks, PeopleTracks())
 
-    Raises
-    ------
-    InputError
-        One line, where the file is no archive or an array is not what it should be.
-    """
-    path = folder / PEOPLE_FILE
-    arrays = read_arrays(path)
-    if arrays is None:
-        return PeopleTracks()
-    try:
-        t_s, radius_m = arrays.floats("t_s", -1), arrays.floats("radius_m", -1)
-        places_m = arrays.floats("places_m", len(t_s), len(radius_m), 2)
-        if not (np.isfinite(t_s).all() and (np.diff(t_s) > 0.0).all()):
-            raise ValueError("t_s: expected rising times")
-        if not ((radius_m > 0.0) & (radius_m <= FARTHEST_M)).all():
-            raise ValueError("radius_m: expected radii above 0 m")
-    except ValueError as error:
-        raise broken(path, error) from None
+
+def _tracks(arrays: Arrays) -> PeopleTracks:
+    t_s, radius_m = arrays.floats("t_s", -1), arrays.floats("radius_m", -1)
+    places_m = arrays.floats("places_m", len(t_s), len(radius_m), 2)
+    if not (np.isfinite(t_s).all() and (np.diff(t_s) > 0.0).all()):
+        raise ValueError("t_s: expected rising times")
+    if not ((radius_m > 0.0) & (radius_m <= FARTHEST_M)).all():
+        raise ValueError("radius_m: expected radii above 0 m")
     places_m[~(np.abs(places_m) <= FARTHEST_M)] = np.nan
     return PeopleTracks(t_s, places_m, radius_m)

@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 
 from pilotage.core.types import FloatArray
-from pilotage.records.arrays import Arrays, read_arrays, write_arrays
+from pilotage.records.arrays import Arrays, read_record, write_arrays
 from pilotage.records.numbers import FARTHEST_M
-from pilotage.records.reading import broken
 
 PLANS_FILE = "plans.npz"
 
@@ -65,28 +64,16 @@ def write_plans(folder: Path, plans: Plans) -> None:
 
 
 def read_plans(folder: Path) -> Plans:
-    """Read the plans; none where there is no such file.
+    """Read the plans; none where there is no such file; InputError as ``read_record``."""
+    return read_record(folder / PLANS_FILE, _plans, Plans())
 
-    Raises
-    ------
-    InputError
-        One line, where the file is no archive or an array is not what it should be.
-    """
-    path = folder / PLANS_FILE
-    arrays = read_arrays(path)
-    if arrays is None:
-        return Plans()
-    try:
-        plans: list[Plan] = []
-        while f"path_{len(plans)}" in arrays:
-            plans.append(_plan(arrays, len(plans)))
-        return Plans(
-            tuple(plans),
-            places(arrays, "mapped_points", (2,)),
-            places(arrays, "shortest_path", (2,)),
-        )
-    except ValueError as error:
-        raise broken(path, error) from None
+
+def _plans(arrays: Arrays) -> Plans:
+    plans: list[Plan] = []
+    while f"path_{len(plans)}" in arrays:
+        plans.append(_plan(arrays, len(plans)))
+    mapped, shortest = (places(arrays, name, (2,)) for name in ("mapped_points", "shortest_path"))
+    return Plans(tuple(plans), mapped, shortest)
 
 
 def _plan(arrays: Arrays, i: int) -> Plan:

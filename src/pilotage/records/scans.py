@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 
 from pilotage.core.types import FloatArray, IntArray
-from pilotage.records.arrays import Arrays, read_arrays, write_arrays
+from pilotage.records.arrays import Arrays, read_record, write_arrays
 from pilotage.records.numbers import FARTHEST_M
-from pilotage.records.reading import broken
 
 SCANS_FILE = "scans.npz"
 LEVELS = 65534
@@ -85,25 +84,13 @@ def write_sightings(folder: Path, sightings: Sightings) -> None:
 
 
 def read_sightings(folder: Path) -> Sightings:
-    """Read the sightings; a part that the robot had no sensor for is empty.
-
-    Raises
-    ------
-    InputError
-        One line, where the file is no archive or an array is not what it should be.
-    """
-    path = folder / SCANS_FILE
-    arrays = read_arrays(path)
-    if arrays is None:
-        return Sightings()
-    try:
-        return Sightings(*_scans(arrays), *_beacons(arrays), _max_range_m(arrays))
-    except ValueError as error:
-        raise broken(path, error) from None
+    """Read the sightings; a part that the robot had no sensor for is empty; InputError as ``read_record``."""
+    return read_record(folder / SCANS_FILE, _sightings, Sightings())
 
 
-def _max_range_m(arrays: Arrays) -> float:
-    return arrays.scalar("scan_resolution_m", np.nan) * LEVELS
+def _sightings(arrays: Arrays) -> Sightings:
+    max_range_m = arrays.scalar("scan_resolution_m", np.nan) * LEVELS
+    return Sightings(*_scans(arrays), *_beacons(arrays), max_range_m)
 
 
 def _scans(arrays: Arrays) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:

@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pilotage.core.types import FloatArray, IntArray
-from pilotage.records.arrays import Arrays, read_arrays, write_arrays
+from pilotage.records.arrays import Arrays, read_record, write_arrays
 from pilotage.records.numbers import FARTHEST_M
 from pilotage.records.plans import places
-from pilotage.records.reading import broken
 
 TERRAIN_FILE = "terrain.npz"
 MOST_PIXELS = 4_000_000
@@ -84,36 +83,27 @@ def write_terrain(folder: Path, pictures: TerrainPictures) -> None:
 
 
 def read_terrain(folder: Path) -> TerrainPictures | None:
-    """Read the pictures; None where the run was on no terrain.
+    """Read the pictures; None where the run was on no terrain; InputError as ``read_record``."""
+    return read_record(folder / TERRAIN_FILE, _pictures, None)
 
-    Raises
-    ------
-    InputError
-        One line, where the file is no archive or an array is not what it should be.
-    """
-    path = folder / TERRAIN_FILE
-    arrays = read_arrays(path)
-    if arrays is None:
-        return None
-    try:
-        landmarks = places(arrays, "landmarks", (2,))
-        hazards = _picture(arrays, "hazards", (-1, -1))
-        shape = (hazards.shape[0], hazards.shape[1])
-        return TerrainPictures(
-            _picture(arrays, "ground", shape) if "ground" in arrays else None,
-            hazards,
-            _picture(arrays, "looked_at", shape) if "looked_at" in arrays else None,
-            _size(arrays),
-            _place(arrays, "origin", 3),
-            _place(arrays, "start", 2),
-            _place(arrays, "goal", 2),
-            arrays.scalar("slope_limit_deg"),
-            landmarks,
-            places(arrays, "route", (2,)),
-            *_seen(arrays, len(landmarks)),
-        )
-    except ValueError as error:
-        raise broken(path, error) from None
+
+def _pictures(arrays: Arrays) -> TerrainPictures:
+    landmarks = places(arrays, "landmarks", (2,))
+    hazards = _picture(arrays, "hazards", (-1, -1))
+    shape = (hazards.shape[0], hazards.shape[1])
+    return TerrainPictures(
+        _picture(arrays, "ground", shape) if "ground" in arrays else None,
+        hazards,
+        _picture(arrays, "looked_at", shape) if "looked_at" in arrays else None,
+        _size(arrays),
+        _place(arrays, "origin", 3),
+        _place(arrays, "start", 2),
+        _place(arrays, "goal", 2),
+        arrays.scalar("slope_limit_deg"),
+        landmarks,
+        places(arrays, "route", (2,)),
+        *_seen(arrays, len(landmarks)),
+    )
 
 
 def _picture(arrays: Arrays, name: str, shape: tuple[int, int]) -> Picture:

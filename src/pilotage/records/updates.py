@@ -11,9 +11,9 @@ import numpy as np
 
 from pilotage.core.scan_update import LineVerdict, ScanUpdate
 from pilotage.core.types import Pose2
-from pilotage.records.arrays import Arrays, read_arrays, write_arrays
+from pilotage.records.arrays import Arrays, read_record, write_arrays
 from pilotage.records.plans import places
-from pilotage.records.reading import broken, clean_text
+from pilotage.records.reading import clean_text
 
 UPDATES_FILE = "updates.npz"
 VERDICTS = tuple(LineVerdict)
@@ -70,24 +70,15 @@ def write_updates(folder: Path, updates: Iterable[KeptUpdate]) -> None:
 
 
 def read_updates(folder: Path) -> tuple[RecordedUpdate, ...]:
-    """Read the updates; none where there is no such file.
+    """Read the updates; none where there is no such file; InputError as ``read_record``."""
+    return read_record(folder / UPDATES_FILE, _updates, ())
 
-    Raises
-    ------
-    InputError
-        One line, where the file is no archive or an array is not what it should be.
-    """
-    path = folder / UPDATES_FILE
-    arrays = read_arrays(path)
-    if arrays is None:
-        return ()
-    try:
-        updates: list[RecordedUpdate] = []
-        while f"t_s_{len(updates)}" in arrays:
-            updates.append(_update(arrays, len(updates)))
-        return tuple(updates)
-    except ValueError as error:
-        raise broken(path, error) from None
+
+def _updates(arrays: Arrays) -> tuple[RecordedUpdate, ...]:
+    updates: list[RecordedUpdate] = []
+    while f"t_s_{len(updates)}" in arrays:
+        updates.append(_update(arrays, len(updates)))
+    return tuple(updates)
 
 
 def _update(arrays: Arrays, k: int) -> RecordedUpdate:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from typing import Annotated
 
+import numpy as np
 from pydantic import Field
 
 from pilotage.core.config import Config
 from pilotage.core.errors import InputError
 from pilotage.core.registry import Registry
-from pilotage.core.types import Pose2
+from pilotage.core.types import FloatArray, Pose2
 from pilotage.sensors.numbers import Numbers, SensorSetting
 
 NonNegative = Annotated[float, Field(ge=0.0)]
@@ -28,6 +29,10 @@ class Mount(Config):
     def pose(self) -> Pose2:
         """As a pose."""
         return Pose2(self.x_m, self.y_m, self.theta_rad)
+
+    def as_array(self) -> FloatArray:
+        """(3,) x, y, theta, for the kernels."""
+        return np.array([self.x_m, self.y_m, self.theta_rad])
 
 
 class SensorConfig(Config):

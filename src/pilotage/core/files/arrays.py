@@ -31,7 +31,7 @@ _PACKINGS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 _DAMAGED = (zipfile.BadZipFile, zlib.error, EOFError, ValueError, KeyError, RuntimeError, OSError)
 
 
-def map_npy(path: Path, what: str = "a .npy file") -> Array:
+def map_npy(path: Path) -> Array:
     """Map a NumPy file into memory, read-only.
 
     Raises
@@ -39,7 +39,7 @@ def map_npy(path: Path, what: str = "a .npy file") -> Array:
     InputError
         Where it is no such file, holds objects, or less than its header says.
     """
-    with opened(path, what, DATA_BYTES) as file:
+    with opened(path, "a .npy file", DATA_BYTES) as file:
         shape, dtype, fortran = _header(file, str(path))
         at = file.tell()
     held = require_file(path) - at
@@ -53,9 +53,9 @@ def map_npy(path: Path, what: str = "a .npy file") -> Array:
         raise InputError(f"{path}: expected a NumPy array, found: {in_words(error)}") from None
 
 
-def read_npy(path: Path, what: str = "a .npy file") -> Array:
+def read_npy(path: Path) -> Array:
     """Read a NumPy file; fails as ``map_npy``, but lives on where the file shrinks meanwhile."""
-    with opened(path, what, DATA_BYTES) as file:
+    with opened(path, "a .npy file", DATA_BYTES) as file:
         return _array(file, require_file(path), str(path))
 
 

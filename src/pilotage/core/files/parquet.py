@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -48,6 +49,22 @@ def read_parquet(
     import pyarrow as pa
     import pyarrow.parquet as pq
 
+    with _opened(path, what, most) as (file, data):
+        wanted = _wanted(file, names, perhaps, str(path))
+        _require_room(file.metadata, len(wanted), str(path), limit(most))
+        # Text stays a dictionary until its letters are counted: one long word may stand in every row.
+        text = [name for name in wanted if _is_text(file.schema_arrow.field(name).type)]
+        file = pq.ParquetFile(pa.BufferReader(data), read_dictionary=text) if text else file
+        table = file.read(columns=wanted, use_threads=False)
+    return {name: _column(table.column(name), f"{path}: {name}") for name in wanted}
+
+
+@contextmanager
+def _opened(path: Path, what: str, most: int) -> Iterator[tuple[Any, bytes]]:
+    """The file, and its bytes; what Arrow finds wrong with it is an InputError of one line."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
     data = read_bytes(path, what, most)
     try:
         with pq.ParquetFile(
@@ -55,16 +72,10 @@ def read_parquet(
             thrift_string_size_limit=_HEADER_BYTES,
             thrift_container_size_limit=_HEADER_BYTES,
         ) as file:
-            wanted = _wanted(file, names, perhaps, str(path))
-            _require_room(file.metadata, len(wanted), str(path), limit(most))
-            # Text stays a dictionary until its letters are counted: one long word may stand in every row.
-            text = [name for name in wanted if _is_text(file.schema_arrow.field(name).type)]
-            file = pq.ParquetFile(pa.BufferReader(data), read_dictionary=text) if text else file
-            table = file.read(columns=wanted, use_threads=False)
+            yield file, data
     except (pa.ArrowException, OSError, ValueError, MemoryError, KeyError, OverflowError) as error:
         said = str(error).splitlines()[0] if str(error) else "damaged data"
         raise InputError(f"{path}: expected {what}, found: {said}") from None
-    return {name: _column(table.column(name), f"{path}: {name}") for name in wanted}
 
 
 def arrow_table(columns: Mapping[str, Array], metadata: Mapping[str, str] | None = None) -> Any:
@@ -85,7 +96,7 @@ def arrow_table(columns: Mapping[str, Array], metadata: Mapping[str, str] | None
     return pa.table({name: column(values) for name, values in columns.items()}, metadata=metadata)
 
 
-def parquet_metadata(path: Path, what: str = "a Parquet file", most: int = DATA_BYTES) -> dict[str, str]:
+def parquet_metadata(path: Path) -> dict[str, str]:
     """Read the texts that stand beside the columns, by their keys; none where there are none.
 
     Raises
@@ -93,21 +104,9 @@ def parquet_metadata(path: Path, what: str = "a Parquet file", most: int = DATA_
     InputError
         Where it is no such file.
     """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    data = read_bytes(path, what, most)
-    try:
-        with pq.ParquetFile(
-            pa.BufferReader(data),
-            thrift_string_size_limit=_HEADER_BYTES,
-            thrift_container_size_limit=_HEADER_BYTES,
-        ) as file:
-            found: dict[bytes, bytes] = file.schema_arrow.metadata or {}
-            return {k.decode(errors="replace"): v.decode(errors="replace") for k, v in found.items()}
-    except (pa.ArrowException, OSError, ValueError, MemoryError) as error:
-        said = str(error).splitlines()[0] if str(error) else "damaged data"
-        raise InputError(f"{path}: expected {what}, found: {said}") from None
+    with _opened(path, "a Parquet file", DATA_BYTES) as (file, _):
+        found: dict[bytes, bytes] = file.schema_arrow.metadata or {}
+        return {k.decode(errors="replace"): v.decode(errors="replace") for k, v in found.items()}
 
 
 def _wanted(file: Any, names: Sequence[str] | None, perhaps: Sequence[str], where: str) -> list[str]:

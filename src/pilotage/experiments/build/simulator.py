@@ -11,8 +11,7 @@ from pilotage.core.types import IntArray
 from pilotage.experiments.build.obstacles import Obstacles
 from pilotage.experiments.build.places import pose_of
 from pilotage.experiments.build.robots import faults_of, motion_of
-from pilotage.experiments.oracles.drive import faithful
-from pilotage.experiments.oracles.ideal_sensors import ideal_sensors
+from pilotage.experiments.oracles.ideal_sensors import faithful, ideal_sensors
 from pilotage.maps.world_map import WorldMap
 from pilotage.missions.mission import Mission
 from pilotage.sim.people.people import PEOPLE, People, PeopleSetting

@@ -1,14 +1,12 @@
-"""Sensors without faults, for the oracle ``sensors`` of every mission.
-
-A sensor's description holds what it is (reach, rate, mounting, resolution) and what it does wrong. Here is
-what each does wrong, and the value at which it does not.
-"""
+"""The hardware without faults: what each sensor reads without noise, and a drive that does as it is told."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any, TypeVar
 
+from pilotage.models.motion.motion import MotionConfig
+from pilotage.models.motion.wheel_drive import WheelDriveConfig, WheelErrorsConfig
 from pilotage.sensors.beacon import BeaconConfig
 from pilotage.sensors.bumper import BumperConfig
 from pilotage.sensors.compass import CompassConfig
@@ -79,3 +77,13 @@ def ideal(config: S) -> S:
 def ideal_sensors(sensors: Mapping[str, S]) -> dict[str, S]:
     """All sensors of a robot without their faults."""
     return {name: ideal(config) for name, config in sensors.items()}
+
+
+def faithful(motion: MotionConfig) -> MotionConfig:
+    """The same motion without errors and lag; random slip is still drawn and comes to nothing."""
+    if not isinstance(motion, WheelDriveConfig):
+        return motion
+    exact = WheelErrorsConfig(
+        radius_difference=0.0, separation_error=(0.0, 0.0), slip=(0.0, 0.0), slip_std_m_sqrt_m=0.0
+    )
+    return motion.model_copy(update={"motor_lag_s": 0.0, "errors": exact})

@@ -16,6 +16,10 @@ EPSILON_S = 1e-9
 UNMODELLED = 0.2
 """Share of the data sheet's accelerations by which rates change as no command told, from step to step."""
 BIAS_S = 0.25
+FORGET = 0.99
+"""Per step: the limits may change with the ground."""
+MOST_ERROR = 25.0
+"""Of one step, in squared standard deviations: a bump is no limit."""
 
 
 @kernel
@@ -119,14 +123,14 @@ def filter_rates(
 
 
 @kernel
-def weigh(costs: FloatArray, prior: FloatArray, errors: FloatArray, forget: float, most: float) -> int:
-    """Add errors (H,), each ``most`` at most, to costs that fade towards ``prior``; in place.
+def weigh(costs: FloatArray, prior: FloatArray, errors: FloatArray) -> int:
+    """Add errors (H,), each ``MOST_ERROR`` at most, to costs that fade towards ``prior``; in place.
 
     Returns the index of the least. In one call: those of numpy cost more than the predictions themselves.
     """
     best = 0
     for h in range(costs.shape[0]):
-        costs[h] = prior[h] + forget * (costs[h] - prior[h]) + min(errors[h], most)
+        costs[h] = prior[h] + FORGET * (costs[h] - prior[h]) + min(errors[h], MOST_ERROR)
         if costs[h] < costs[best]:
             best = h
     return best

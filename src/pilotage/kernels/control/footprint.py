@@ -1,4 +1,4 @@
-"""Convex footprints against points and discs: exact distances, and the first contact along an arc."""
+"""Convex footprints against points and discs: exact distances."""
 
 from __future__ import annotations
 
@@ -6,12 +6,7 @@ import math
 from typing import NamedTuple
 
 from pilotage.kernels.arrays import FloatArray
-from pilotage.kernels.geometry.motion import exact_arc
 from pilotage.kernels.jit import kernel
-
-CONTACT_M = 1e-4
-"""Nearer than this is contact: conservative advancement would creep for ever towards 0."""
-ADVANCES = 400
 
 
 class Body(NamedTuple):
@@ -75,44 +70,3 @@ def discs_clearance(x: float, y: float, theta: float, polygon: FloatArray, discs
             continue
         best = min(best, polygon_distance(c * dx + s * dy, c * dy - s * dx, polygon) - discs[i, 2])
     return best
-
-
-@kernel
-def first_contact(
-    x: float,
-    y: float,
-    theta: float,
-    distance: float,
-    angle: float,
-    polygon: FloatArray,
-    discs: FloatArray,
-) -> tuple[float, float]:
-    """How much of an arc a footprint drives before it touches a disc (N, 3).
-
-    Exact, by conservative advancement.
-
-    No point of the body moves faster than the arc's length plus turn times the outer radius, so from a
-    clearance c the share c / that speed is free (Mirtich 1996).
-
-    Returns
-    -------
-    share, clearance_m
-        Share of the arc driven, 1 without a contact, and the least clearance that was measured on the way
-        (at most the step's motion above the least one there was).
-    """
-    reach = 0.0
-    for k in range(polygon.shape[0]):
-        reach = max(reach, math.hypot(polygon[k, 0], polygon[k, 1]))
-    speed = abs(distance) + abs(angle) * reach
-    least = math.inf
-    at = 0.0
-    for _ in range(ADVANCES):
-        px, py, ptheta = exact_arc(x, y, theta, at * distance, at * angle)
-        here = discs_clearance(px, py, ptheta, polygon, discs)
-        least = min(least, here)
-        if here <= CONTACT_M:
-            return at, least
-        if at >= 1.0 or speed == 0.0:
-            return 1.0, least
-        at = min(1.0, at + here / speed)
-    return at, least

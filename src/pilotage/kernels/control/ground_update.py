@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,6 +17,30 @@ SECTORS = 1024
 """Around the laser: a cell beyond the longest range in its sector is asked for no beam, nor for an angle."""
 BEHIND_M = 0.2
 """A beam that ends so far behind a cell's hits has passed them by."""
+
+
+class Grids(NamedTuple):
+    """What a scan changes: of ``ground.Ground`` the hits, their means and the corner of the cells.
+
+    ``seen`` (m, m) are the coarse cells, twice as wide, that have been seen.
+    """
+
+    hits: ByteArray
+    mean: FloatArray
+    seen: BoolArray
+    x0: float
+    y0: float
+    cell: float
+
+
+class Fan(NamedTuple):
+    """A scan; ``of_sectors`` (2, ``SECTORS``) as ``sectors`` has it."""
+
+    ranges: FloatArray
+    first: float
+    step: float
+    max_range: float
+    of_sectors: IntArray
 
 
 @kernel
@@ -47,36 +72,27 @@ def _sector(u: float, v: float) -> int:
 
 
 @kernel
-def _farthest(ranges: FloatArray, of_sectors: IntArray) -> FloatArray:
+def _farthest(fan: Fan) -> FloatArray:
     """The longest range (``SECTORS``,) in each sector; -1 where there are no beams."""
     out = np.full(SECTORS, -1.0)
     for i in range(SECTORS):
-        for k in range(of_sectors[0, i], of_sectors[1, i] + 1):
-            out[i] = max(out[i], ranges[k])
+        for k in range(fan.of_sectors[0, i], fan.of_sectors[1, i] + 1):
+            out[i] = max(out[i], fan.ranges[k])
     return out
 
 
 @kernel
 def insert_scan(
-    hits: ByteArray,
-    mean: FloatArray,
-    seen: BoolArray,
+    grids: Grids,
+    fan: Fan,
     pose: FloatArray,
     mount: FloatArray,
-    ranges: FloatArray,
-    of_sectors: IntArray,
-    first: float,
-    step: float,
-    max_range: float,
     reach: float,
     dense: float,
     in_base: FloatArray,
     polygon: FloatArray,
     inside: float,
     fade: int,
-    x0: float,
-    y0: float,
-    cell: float,
 ) -> None:
     """Take a scan into the grids; in place.
 
@@ -84,8 +100,6 @@ def insert_scan(
     ----------
     pose, mount
         (3,) of the base, and of the laser on it.
-    of_sectors
-        (2, ``SECTORS``) as ``sectors`` has it.
     dense
         As far from the laser no obstacle fits between two beams; farther than that nothing is seen.
     in_base
@@ -99,12 +113,12 @@ def insert_scan(
     x = pose[0] + c * mount[0] - s * mount[1]
     y = pose[1] + s * mount[0] + c * mount[1]
     theta = pose[2] + mount[2]
-    far = _farthest(ranges, of_sectors)
+    far = _farthest(fan)
     if fade > 0:
-        _clear_passed(hits, mean, x, y, theta, ranges, far, first, step, max_range, cell, fade)
-    _add_points(hits, mean, in_base, pose[0], pose[1], c, s, mount[0], mount[1], reach, x0, y0, cell)
-    _clear_inside(hits, mean, pose[0], pose[1], c, s, polygon, inside, x0, y0, cell)
-    _mark_seen(seen, x, y, theta, ranges, far, first, step, x0, y0, 2.0 * cell, min(reach, dense))
+        _clear_passed(grids, fan, far, x, y, theta, fade)
+    _add_points(grids, in_base, pose[0], pose[1], c, s, mount[0], mount[1], reach)
+    _clear_inside(grids, pose[0], pose[1], c, s, polygon, inside)
+    _mark_seen(grids, fan, far, x, y, theta, min(reach, dense))
 
 
 @kernel
@@ -121,31 +135,22 @@ def _turned(angle: float) -> float:
 
 @kernel
 def _clear_passed(
-    hits: ByteArray,
-    mean: FloatArray,
-    x: float,
-    y: float,
-    theta: float,
-    ranges: FloatArray,
-    far: FloatArray,
-    first: float,
-    step: float,
-    max_range: float,
-    cell: float,
-    fade: int,
+    grids: Grids, fan: Fan, far: FloatArray, x: float, y: float, theta: float, fade: int
 ) -> None:
     """Take ``fade`` hits from every cell that all beams towards it pass by; in place.
 
     Something that was there has gone. A cell seen edge-on keeps its hits: one of the beams towards it still
     ends near it.
     """
-    flat = hits.reshape(-1)
+    mean, cell = grids.mean, grids.cell
+    flat = grids.hits.reshape(-1)
+    ranges, first, step = fan.ranges, fan.first, fan.step
     beams = ranges.shape[0]
     c, s = math.cos(theta + first), math.sin(theta + first)
-    for i in occupied(hits):
+    for i in occupied(grids.hits):
         dx, dy = mean[i, 0] - x, mean[i, 1] - y
         distance = math.sqrt(dx * dx + dy * dy)
-        if distance < cell or distance + BEHIND_M >= max_range:
+        if distance < cell or distance + BEHIND_M >= fan.max_range:
             continue
         if far[_sector(c * dx + s * dy, c * dy - s * dx)] < distance + BEHIND_M:
             continue
@@ -165,8 +170,7 @@ def _clear_passed(
 
 @kernel
 def _add_points(
-    hits: ByteArray,
-    mean: FloatArray,
+    grids: Grids,
     in_base: FloatArray,
     x: float,
     y: float,
@@ -175,11 +179,9 @@ def _add_points(
     from_x: float,
     from_y: float,
     reach: float,
-    x0: float,
-    y0: float,
-    cell: float,
 ) -> None:
     """Count points (N, 2) of the base's frame in the cells they fall into, move the means; in place."""
+    hits, mean, x0, y0, cell = grids.hits, grids.mean, grids.x0, grids.y0, grids.cell
     n = hits.shape[0]
     beam_x, beam_y = x + (c * from_x - s * from_y), y + (s * from_x + c * from_y)
     for i in range(in_base.shape[0]):
@@ -193,7 +195,7 @@ def _add_points(
         if hits[row, column] == 0:
             mean[row * n + column, 0], mean[row * n + column, 1] = there_x, there_y
         if hits[row, column] >= MOST_HITS:
-            _halve_passed(hits, mean, row, column, there_x, there_y, beam_x, beam_y, cell)
+            _halve_passed(grids, row, column, there_x, there_y, beam_x, beam_y)
         hits[row, column] += np.uint8(1)
         share = 1.0 / hits[row, column]
         mean[row * n + column, 0] += share * (there_x - mean[row * n + column, 0])
@@ -202,10 +204,10 @@ def _add_points(
 
 @kernel
 def _halve_passed(
-    hits: ByteArray, mean: FloatArray, row: int, column: int, to_x: float, to_y: float, from_x: float,
-    from_y: float, cell: float,
-) -> None:  # fmt: skip
+    grids: Grids, row: int, column: int, to_x: float, to_y: float, from_x: float, from_y: float
+) -> None:
     """Halve the hits of a beam's last cell, and of the neighbours that it passed through; in place."""
+    hits, mean = grids.hits, grids.mean
     n = hits.shape[0]
     dx, dy = from_x - to_x, from_y - to_y
     away = max(math.hypot(dx, dy), 1e-9)
@@ -216,25 +218,16 @@ def _halve_passed(
             if hits[r, c] == 0 or (r == row and c == column):
                 continue
             bx, by = mean[r * n + c, 0] - to_x, mean[r * n + c, 1] - to_y
-            if bx * dx + by * dy > 0.0 and abs(bx * dy - by * dx) < 0.5 * cell:
+            if bx * dx + by * dy > 0.0 and abs(bx * dy - by * dx) < 0.5 * grids.cell:
                 hits[r, c] = np.uint8(int(hits[r, c]) // 2)
 
 
 @kernel
 def _clear_inside(
-    hits: ByteArray,
-    mean: FloatArray,
-    x: float,
-    y: float,
-    c: float,
-    s: float,
-    polygon: FloatArray,
-    depth: float,
-    x0: float,
-    y0: float,
-    cell: float,
+    grids: Grids, x: float, y: float, c: float, s: float, polygon: FloatArray, depth: float
 ) -> None:
     """Empty the cells whose mean lies deeper than ``depth`` inside the footprint; in place."""
+    hits, mean, x0, y0, cell = grids.hits, grids.mean, grids.x0, grids.y0, grids.cell
     n = hits.shape[0]
     reach = 0.0
     for k in range(polygon.shape[0]):
@@ -254,23 +247,14 @@ def _clear_inside(
 
 @kernel
 def _mark_seen(
-    seen: BoolArray,
-    x: float,
-    y: float,
-    theta: float,
-    ranges: FloatArray,
-    far: FloatArray,
-    first: float,
-    step: float,
-    x0: float,
-    y0: float,
-    coarse: float,
-    reach: float,
+    grids: Grids, fan: Fan, far: FloatArray, x: float, y: float, theta: float, reach: float
 ) -> None:
     """Mark the coarse cells (m, m) whose centre both beams beside it reach; in place.
 
     Between beams that are farther apart than an obstacle is wide nothing is known: ``reach`` ends before.
     """
+    seen, x0, y0, coarse = grids.seen, grids.x0, grids.y0, 2.0 * grids.cell
+    ranges, first, step = fan.ranges, fan.first, fan.step
     m = seen.shape[0]
     beams = ranges.shape[0]
     slack = 0.5 * coarse

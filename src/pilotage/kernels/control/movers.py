@@ -14,6 +14,10 @@ from pilotage.kernels.jit import kernel
 # number of readings, steps since the last one, place at birth.
 X, Y, VX, VY, PP, PV, VV, READINGS, MISSED, X0, Y0 = range(11)
 COLUMNS = 11
+WALKED_M, THROUGH_M = 0.6, 0.25
+"""So far from where it was first seen, which the laser sees through by so much: it walks beyond doubt."""
+STRAIGHT = 0.8
+"""Share of its motion by which somebody who comes straight on is nearer."""
 
 
 @kernel
@@ -147,18 +151,15 @@ def tell_walkers(
     about: bool,
     walks_speed: float,
     unsure_var: float,
-    walked: float,
-    through: float,
-    straight: float,
     readings: int,
     stands: int,
     parks: int,
 ) -> tuple[BoolArray, bool]:
     """Which tracks (M, 11) do not stand, and whether one of them is of somebody who walks, or did.
 
-    Somebody walks who is faster than ``walks_speed`` and ``walked`` so far from where he was first seen, if
-    the laser at x, y sees ``through`` behind that place, or if he comes ``straight`` on, by that share of
-    his motion. Of him the place is dropped (NaN) and readings count anew from ``readings``: with ``stands``
+    Somebody walks who is faster than ``walks_speed`` and ``WALKED_M`` from where he was first seen, if the
+    laser at x, y sees ``THROUGH_M`` behind that place, or if he comes straight on, by ``STRAIGHT`` of his
+    motion. Of him the place is dropped (NaN) and readings count anew from ``readings``: with ``stands``
     more he stands, with ``parks`` more he is a thing. Others do not stand only while people are ``about``.
     """
     out = np.zeros(tracks.shape[0], np.bool_)
@@ -174,15 +175,15 @@ def tell_walkers(
         # Where nothing was seen it has gone by its own foretelling only.
         if fast and not unsure and not known[i] and track[MISSED] == 0.0:
             went = math.hypot(track[X] - track[X0], track[Y] - track[Y0])
-            if went > walked:
+            if went > WALKED_M:
                 dx, dy = track[X0] - x, track[Y0] - y
                 away = math.hypot(dx, dy)
                 beam = round(((math.atan2(dy, dx) - first) % (2.0 * math.pi)) / step)
                 seen = beam - 1 < ranges.shape[0]
                 for k in range(max(beam - 1, 0), min(beam + 2, ranges.shape[0])):
                     # Also of a beam without an answer nothing is known.
-                    seen = seen and ranges[k] > away + through
-                known[i] = seen or away - math.hypot(track[X] - x, track[Y] - y) > straight * went
+                    seen = seen and ranges[k] > away + THROUGH_M
+                known[i] = seen or away - math.hypot(track[X] - x, track[Y] - y) > STRAIGHT * went
         if known[i] and fast and not unsure:
             track[READINGS], track[X0] = readings, math.nan
         if not known[i]:

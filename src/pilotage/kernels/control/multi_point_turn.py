@@ -23,6 +23,8 @@ MOVE, DEAR = 4, 8
 """What a move costs, and so much more without any room beyond the margin."""
 BUCKETS = 32
 MOST = 60_000
+OFF_RAD = 0.35
+"""Headed for its way within this it plans again."""
 ASIDE_RAD = 0.5
 """By so much the bearing of the point may change on the way."""
 AHEAD = 4
@@ -34,13 +36,12 @@ def multi_point_turn(
     start: FloatArray,
     to_x: float,
     to_y: float,
-    off: float,
     body: Body,
     ground: Ground,
     margin: float,
     behind: float,
 ) -> FloatArray:
-    """Poses (N, 3) from ``start`` (3,) to one headed for a point within ``off``; (0, 3) where none is found.
+    """Poses (N, 3) from ``start`` (3,) to one headed for a point within ``OFF_RAD``; (0, 3) for none.
 
     A* over places of a centimetre and 72 headings, each kept with the pose at which it was reached first, as
     in hybrid A* (Dolgov et al. 2010); what is left to turn, seen from the start, is the least to come. Moves:
@@ -64,7 +65,7 @@ def multi_point_turn(
     to_come = np.empty(HEADINGS, np.int64)
     bearing = math.atan2(to_y - start[1], to_x - start[0])
     for h in range(HEADINGS):
-        left = abs(wrap(bearing - start[2] - TWO_PI * h / HEADINGS)) - off - ASIDE_RAD
+        left = abs(wrap(bearing - start[2] - TWO_PI * h / HEADINGS)) - OFF_RAD - ASIDE_RAD
         to_come[h] = MOVE * max(math.floor(left * HEADINGS / TWO_PI), 0)
     now, count, idle = to_come[0], 1, 0
     head[now % BUCKETS] = 0
@@ -77,7 +78,7 @@ def multi_point_turn(
         idle = 0
         head[now % BUCKETS] = after[at]
         x, y, theta = poses[at, 0], poses[at, 1], poses[at, 2]
-        if abs(wrap(math.atan2(to_y - y, to_x - x) - theta)) < off and _is_free_ahead(
+        if abs(wrap(math.atan2(to_y - y, to_x - x) - theta)) < OFF_RAD and _is_free_ahead(
             x, y, theta, body, ground, margin
         ):
             return _traced(poses, parent, at)

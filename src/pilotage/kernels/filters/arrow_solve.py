@@ -9,6 +9,7 @@ the cost grows with the length of the chain, not with its cube.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,6 +19,43 @@ from pilotage.kernels.jit import kernel
 SOLVED = 0
 NOT_POSITIVE = 1
 """The matrix is singular: something is not tied to anything."""
+
+
+class Arrow(NamedTuple):
+    """A chain of N blocks of m unknowns and G unknowns that all share: normal matrix and right-hand sides.
+
+    Attributes
+    ----------
+    diagonal
+        (N, m, m) blocks of the chain.
+    coupling
+        (N, m, m): entry i couples block i (rows) with block i + 1 (columns).
+    border
+        (N, m, G) couples block i with the shared unknowns.
+    corner
+        (G, G) of the shared unknowns.
+    right, right_corner
+        (N, m) and (G,) right-hand sides.
+    """
+
+    diagonal: FloatArray
+    coupling: FloatArray
+    border: FloatArray
+    corner: FloatArray
+    right: FloatArray
+    right_corner: FloatArray
+
+
+def no_arrow(blocks: int, m: int, shared: int) -> Arrow:
+    """Nothing but zeros, to add factors to."""
+    return Arrow(
+        np.zeros((blocks, m, m)),
+        np.zeros((blocks, m, m)),
+        np.zeros((blocks, m, shared)),
+        np.zeros((shared, shared)),
+        np.zeros((blocks, m)),
+        np.zeros(shared),
+    )
 
 
 @kernel
@@ -37,39 +75,15 @@ def cholesky(a: FloatArray, n: int) -> bool:
 
 
 @kernel
-def solve_arrow(
-    diagonal: FloatArray,
-    coupling: FloatArray,
-    border: FloatArray,
-    corner: FloatArray,
-    right: FloatArray,
-    right_corner: FloatArray,
-    blocks: int,
-    shared: int,
-) -> int:
-    """Solve in place; afterwards ``right`` and ``right_corner`` hold the solution.
+def solve_arrow(arrow: Arrow) -> int:
+    """Solve in place; ``SOLVED`` or ``NOT_POSITIVE``.
 
-    Parameters
-    ----------
-    diagonal
-        (N, m, m) blocks of the chain; becomes their Cholesky factors.
-    coupling
-        (N, m, m): entry i couples block i (rows) with block i + 1 (columns).
-    border
-        (N, m, G) couples block i with the shared unknowns.
-    corner
-        (G, G) of the shared unknowns; becomes the Cholesky factor of their Schur complement, whose
-        inverse is their covariance.
-    right, right_corner
-        (N, m) and (G,) right-hand sides.
-    blocks, shared
-        How many of N and G are in use.
-
-    Returns
-    -------
-    int
-        ``SOLVED`` or ``NOT_POSITIVE``.
+    Afterwards the right-hand sides hold the solution, ``diagonal`` the Cholesky factors of its blocks, and
+    ``corner`` that of the shared unknowns' Schur complement, whose inverse is their covariance.
     """
+    diagonal, coupling, border, corner = arrow.diagonal, arrow.coupling, arrow.border, arrow.corner
+    right, right_corner = arrow.right, arrow.right_corner
+    blocks, shared = diagonal.shape[0], corner.shape[0]
     m = diagonal.shape[1]
     for i in range(blocks):
         block = diagonal[i]
@@ -143,17 +157,10 @@ def substitute(factor: FloatArray, right: FloatArray, n: int) -> None:
 
 
 @kernel
-def last_block_cov(block: FloatArray, border: FloatArray, corner: FloatArray, shared: int) -> FloatArray:
-    """(m, m) covariance of the chain's last block, from the factors that ``solve_arrow`` left.
-
-    Parameters
-    ----------
-    block, border
-        (m, m) factor and (m, G) border of the last block.
-    corner
-        (G, G) factor of the shared unknowns.
-    """
-    m = block.shape[0]
+def last_block_cov(arrow: Arrow) -> FloatArray:
+    """(m, m) covariance of the chain's last block, from the factors that ``solve_arrow`` left."""
+    block, border, corner = arrow.diagonal[-1], arrow.border[-1], arrow.corner
+    m, shared = block.shape[0], corner.shape[0]
     cov = np.empty((m, m))
     for column in range(m):
         # Rows above are eliminated: a unit right-hand side in the last block touches nothing before it.

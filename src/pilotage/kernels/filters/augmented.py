@@ -11,6 +11,8 @@ from pilotage.kernels.filters.sighting import (
     OUTCOME_ACCEPTED,
     OUTCOME_GATED,
     OUTCOME_UNKNOWN,
+    Known,
+    Seen,
     landmark_index,
     range_bearing,
 )
@@ -110,34 +112,30 @@ def joseph_update(
 def update_range_bearings(
     state: FloatArray,
     cov: FloatArray,
-    ids: IntArray,
-    ranges: FloatArray,
-    bearings: FloatArray,
-    known_ids: IntArray,
-    known_points: FloatArray,
+    seen: Seen,
+    known: Known,
     mount: FloatArray,
     R: FloatArray,
     gate: float,
-    nis: FloatArray,
-    outcome: IntArray,
-) -> int:
+) -> tuple[int, FloatArray, IntArray]:
     """As ``ekf.update_range_bearings``, with a bearing that reads too large by the state's offset."""
     z, pose_row, H = np.empty(2), np.empty((2, POSE)), np.zeros((2, STATES))
     H[1, BEARING_OFFSET] = 1.0
     innovation = np.empty(2)
-    used = 0
-    for k in range(ids.shape[0]):
+    count, used = seen.ids.shape[0], 0
+    nis, outcome = np.empty(count), np.empty(count, np.int64)
+    for k in range(count):
         nis[k] = math.nan
         outcome[k] = OUTCOME_UNKNOWN
-        i = landmark_index(known_ids, ids[k])
+        i = landmark_index(known.ids, seen.ids[k])
         if i < 0:
             continue
-        if not range_bearing(state[:POSE], known_points[i, 0], known_points[i, 1], mount, z, pose_row):
+        if not range_bearing(state[:POSE], known.points[i, 0], known.points[i, 1], mount, z, pose_row):
             continue
         H[:, :POSE] = pose_row
-        innovation[0] = ranges[k] - z[0]
-        innovation[1] = wrap(bearings[k] - z[1] - state[BEARING_OFFSET])
+        innovation[0] = seen.ranges[k] - z[0]
+        innovation[1] = wrap(seen.bearings[k] - z[1] - state[BEARING_OFFSET])
         nis[k] = joseph_update(state, cov, H, innovation, R, gate)
         outcome[k] = OUTCOME_ACCEPTED if nis[k] <= gate else OUTCOME_GATED
         used += outcome[k]
-    return used
+    return used, nis, outcome

@@ -15,7 +15,14 @@ import math
 import numpy as np
 
 from pilotage.kernels.arrays import FloatArray, IntArray
-from pilotage.kernels.filters.sighting import OUTCOME_ACCEPTED, OUTCOME_GATED, OUTCOME_UNKNOWN, landmark_index
+from pilotage.kernels.filters.sighting import (
+    OUTCOME_ACCEPTED,
+    OUTCOME_GATED,
+    OUTCOME_UNKNOWN,
+    Known,
+    Seen,
+    landmark_index,
+)
 from pilotage.kernels.geometry.motion import wrap
 from pilotage.kernels.jit import kernel
 
@@ -269,51 +276,45 @@ def joseph_update(
 def update_range_bearings(
     state: FloatArray,
     cov: FloatArray,
-    ids: IntArray,
-    ranges: FloatArray,
-    bearings: FloatArray,
-    known_ids: IntArray,
-    known_points: FloatArray,
+    seen: Seen,
+    known: Known,
     mount: FloatArray,
     motion: FloatArray,
     scales: FloatArray,
     depth: float,
     white: FloatArray,
     gate: float,
-    nis: FloatArray,
-    outcome: IntArray,
-) -> int:
-    """Update in place by any number of landmarks (K), one after the other; returns how many were used.
+) -> tuple[int, FloatArray, IntArray]:
+    """Update in place by any number of landmarks (K), one after the other; returns as the EKF's does.
 
-    ``known_ids`` is sorted. ``nis`` (K,) and ``outcome`` (K,) are filled: accepted, gated, unknown id.
     ``white`` (4,) is the variance that is new with every reading, white[0] + white[1] r^2 of the range and
     white[2] + white[3] / r^2 of the bearing; the rest as in `measure`.
     """
     z, H, R = np.empty(2), np.empty((2, SLOPES)), np.zeros((2, 2))
     innovation = np.empty(2)
     places = np.array([0, 1, 2, BEARING, SCALE, OFFSET, AHEAD, LEFT, AGE, AXIS, 0, 0])
-    count = known_ids.shape[0]
-    used = 0
-    for k in range(ids.shape[0]):
+    count, used = known.ids.shape[0], 0
+    nis, outcome = np.empty(seen.ids.shape[0]), np.empty(seen.ids.shape[0], np.int64)
+    for k in range(seen.ids.shape[0]):
         nis[k] = math.nan
         outcome[k] = OUTCOME_UNKNOWN
-        i = landmark_index(known_ids, ids[k])
+        i = landmark_index(known.ids, seen.ids[k])
         if i < 0:
             continue
         places[10], places[11] = LANDMARKS + i, LANDMARKS + count + i
-        x, y = known_points[i, 0], known_points[i, 1]
-        slant = slant_of_depth(bearings[k], depth)
+        x, y = known.points[i, 0], known.points[i, 1]
+        slant = slant_of_depth(seen.bearings[k], depth)
         if not measure(state, x, y, places, mount, motion, scales, slant, z, H):
             continue
-        reading = range_of_depth(ranges[k], bearings[k], depth)
+        reading = range_of_depth(seen.ranges[k], seen.bearings[k], depth)
         innovation[0] = reading - z[0]
-        innovation[1] = wrap(bearings[k] - z[1])
+        innovation[1] = wrap(seen.bearings[k] - z[1])
         R[0, 0] = white[0] + white[1] * reading * reading
         R[1, 1] = white[2] + white[3] / max(reading, MIN_RANGE_M) ** 2
         nis[k] = joseph_update(state, cov, places, H, innovation, R, gate)
         outcome[k] = OUTCOME_ACCEPTED if nis[k] <= gate else OUTCOME_GATED
         used += outcome[k]
-    return used
+    return used, nis, outcome
 
 
 @kernel

@@ -15,6 +15,8 @@ from pilotage.kernels.filters.sighting import (
     OUTCOME_ACCEPTED,
     OUTCOME_GATED,
     OUTCOME_UNKNOWN,
+    Known,
+    Seen,
     landmark_index,
     range_bearing,
 )
@@ -27,36 +29,26 @@ CONVERGED = 1e-9
 
 @kernel
 def update_range_bearings(
-    pose: FloatArray,
-    cov: FloatArray,
-    ids: IntArray,
-    ranges: FloatArray,
-    bearings: FloatArray,
-    known_ids: IntArray,
-    known_points: FloatArray,
-    mount: FloatArray,
-    R: FloatArray,
-    gate: float,
-    nis: FloatArray,
-    outcome: IntArray,
-) -> int:
+    pose: FloatArray, cov: FloatArray, seen: Seen, known: Known, mount: FloatArray, R: FloatArray, gate: float
+) -> tuple[int, FloatArray, IntArray]:
     """As ``ekf.update_range_bearings``, each landmark linearized anew at its own outcome until it settles.
 
     The iterated EKF is Gauss-Newton on the posterior (Bell and Cathey 1993). The gate looks at the first
     linearization; the covariance is that of the last.
     """
     z, innovation, H = np.empty(2), np.empty(2), np.empty((2, 3))
-    used = 0
-    for k in range(ids.shape[0]):
+    count, used = seen.ids.shape[0], 0
+    nis, outcome = np.empty(count), np.empty(count, np.int64)
+    for k in range(count):
         nis[k] = math.nan
         outcome[k] = OUTCOME_UNKNOWN
-        i = landmark_index(known_ids, ids[k])
+        i = landmark_index(known.ids, seen.ids[k])
         if i < 0:
             continue
-        mx, my = known_points[i, 0], known_points[i, 1]
+        mx, my = known.points[i, 0], known.points[i, 1]
         if not range_bearing(pose, mx, my, mount, z, H):
             continue
-        innovation[0], innovation[1] = ranges[k] - z[0], wrap(bearings[k] - z[1])
+        innovation[0], innovation[1] = seen.ranges[k] - z[0], wrap(seen.bearings[k] - z[1])
         prior, prior_cov = pose.copy(), cov.copy()
         nis[k] = joseph_update2(pose, cov, H, innovation, R, gate)
         if not nis[k] <= gate:
@@ -68,8 +60,8 @@ def update_range_bearings(
                 break
             # The innovation seen from the prior: z less the prediction, less the slope times the way back.
             d0, d1, d2 = prior[0] - last[0], prior[1] - last[1], wrap(prior[2] - last[2])
-            innovation[0] = ranges[k] - z[0] - (H[0, 0] * d0 + H[0, 1] * d1 + H[0, 2] * d2)
-            innovation[1] = wrap(bearings[k] - z[1] - (H[1, 0] * d0 + H[1, 1] * d1 + H[1, 2] * d2))
+            innovation[0] = seen.ranges[k] - z[0] - (H[0, 0] * d0 + H[0, 1] * d1 + H[0, 2] * d2)
+            innovation[1] = wrap(seen.bearings[k] - z[1] - (H[1, 0] * d0 + H[1, 1] * d1 + H[1, 2] * d2))
             pose[:] = prior
             cov[:, :] = prior_cov
             joseph_update2(pose, cov, H, innovation, R, math.inf)
@@ -78,4 +70,4 @@ def update_range_bearings(
                 break
         outcome[k] = OUTCOME_ACCEPTED
         used += 1
-    return used
+    return used, nis, outcome

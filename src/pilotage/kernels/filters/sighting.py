@@ -6,6 +6,7 @@ What every filter on ranges and bearings shares; how a sighting moves the belief
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,6 +17,21 @@ from pilotage.kernels.jit import kernel
 OUTCOME_ACCEPTED = 1
 OUTCOME_GATED = 0
 OUTCOME_UNKNOWN = -1
+
+
+class Seen(NamedTuple):
+    """Landmarks as a sensor saw them (K,): which, how far away, and in which direction."""
+
+    ids: IntArray
+    ranges: FloatArray
+    bearings: FloatArray
+
+
+class Known(NamedTuple):
+    """Landmarks of the map: ids (L,), sorted, and places (L, 2)."""
+
+    ids: IntArray
+    points: FloatArray
 
 
 @kernel

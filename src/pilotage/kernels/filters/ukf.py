@@ -15,6 +15,8 @@ from pilotage.kernels.filters.sighting import (
     OUTCOME_ACCEPTED,
     OUTCOME_GATED,
     OUTCOME_UNKNOWN,
+    Known,
+    Seen,
     landmark_index,
     range_bearing,
 )
@@ -106,39 +108,29 @@ def predict(
 
 @kernel
 def update_range_bearings(
-    pose: FloatArray,
-    cov: FloatArray,
-    ids: IntArray,
-    ranges: FloatArray,
-    bearings: FloatArray,
-    known_ids: IntArray,
-    known_points: FloatArray,
-    mount: FloatArray,
-    R: FloatArray,
-    gate: float,
-    nis: FloatArray,
-    outcome: IntArray,
-) -> int:
+    pose: FloatArray, cov: FloatArray, seen: Seen, known: Known, mount: FloatArray, R: FloatArray, gate: float
+) -> tuple[int, FloatArray, IntArray]:
     """Update in place by landmarks one after the other; arguments as for ``ekf.update_range_bearings``."""
     points = np.empty((7, 3))
     wm, wc = np.empty(7), np.empty(7)
     z, H = np.empty(2), np.empty((2, 3))
     predicted = np.empty((7, 2))
-    used = 0
-    for k in range(ids.shape[0]):
+    count, used = seen.ids.shape[0], 0
+    nis, outcome = np.empty(count), np.empty(count, np.int64)
+    for k in range(count):
         nis[k] = math.nan
         outcome[k] = OUTCOME_UNKNOWN
-        index = landmark_index(known_ids, ids[k])
+        index = landmark_index(known.ids, seen.ids[k])
         if index < 0 or not sigma_points(pose, cov, points, wm, wc):
             continue
-        seen = True
+        in_sight = True
         for i in range(7):
-            seen = seen and range_bearing(
-                points[i], known_points[index, 0], known_points[index, 1], mount, z, H
+            in_sight = in_sight and range_bearing(
+                points[i], known.points[index, 0], known.points[index, 1], mount, z, H
             )
             predicted[i, 0] = z[0]
             predicted[i, 1] = z[1]
-        if not seen:
+        if not in_sight:
             continue
         middle = predicted[0, 1]
         average = np.zeros(2)
@@ -157,8 +149,8 @@ def update_range_bearings(
         if not determinant > 0.0:
             continue
         i00, i01, i11 = S[1, 1] / determinant, -S[0, 1] / determinant, S[0, 0] / determinant
-        v0 = ranges[k] - average[0]
-        v1 = wrap(bearings[k] - middle - average[1])
+        v0 = seen.ranges[k] - average[0]
+        v1 = wrap(seen.bearings[k] - middle - average[1])
         nis[k] = v0 * (i00 * v0 + i01 * v1) + v1 * (i01 * v0 + i11 * v1)
         if nis[k] > gate:
             outcome[k] = OUTCOME_GATED
@@ -180,4 +172,4 @@ def update_range_bearings(
                 )
                 cov[c, d] = value
                 cov[d, c] = value
-    return used
+    return used, nis, outcome

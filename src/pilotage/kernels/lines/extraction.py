@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,6 +19,31 @@ MAX_SPAN = 40
 """A sample's second point lies at most this many points after the first: both are likely on one wall."""
 CONFIDENCE_LOG = math.log(0.001)
 """Sampling stops once a better line would have been met with probability 0.999."""
+
+
+class LineRules(NamedTuple):
+    """What makes a line.
+
+    Attributes
+    ----------
+    range_var
+        Variance of a range.
+    threshold, gap, margin
+        How far a point may lie off its line, the next one along it, and how far from its ends none is fitted.
+    least_points, least_length, straight_z
+        Of a line; its residuals pass for straight up to this quantile of a normal distribution.
+    iterations
+        Samples that RANSAC tries at most.
+    """
+
+    range_var: float
+    threshold: float
+    gap: float
+    margin: float
+    least_points: int
+    least_length: float
+    straight_z: float
+    iterations: int
 
 
 @kernel
@@ -162,14 +188,7 @@ def extract_lines(
     points: FloatArray,
     directions: FloatArray,
     labels: IntArray,
-    range_var: float,
-    threshold: float,
-    gap: float,
-    margin: float,
-    least_points: int,
-    least_length: float,
-    straight_z: float,
-    iterations: int,
+    rules: LineRules,
     uniforms: FloatArray,
     lines: FloatArray,
     covs: FloatArray,
@@ -182,7 +201,7 @@ def extract_lines(
     ``members`` (N,), the line that each point was used for. In each cluster the best line is taken out
     with its points, then the best of the rest, as long as enough points are left.
     """
-    n = points.shape[0]
+    n, least_points = points.shape[0], rules.least_points
     members[:] = NO_LINE
     rest = np.empty(n, dtype=np.int64)
     near = np.empty(n, dtype=np.int64)
@@ -198,27 +217,18 @@ def extract_lines(
                 rest[count] = i
                 count += 1
         while count >= least_points and found < lines.shape[0]:
-            rho, alpha, drawn = sample_line(points, rest, count, threshold, iterations, uniforms, drawn)
-            size = _grow(points, rest, count, rho, alpha, threshold, gap, near, run)
+            rho, alpha, drawn = sample_line(
+                points, rest, count, rules.threshold, rules.iterations, uniforms, drawn
+            )
+            size = _grow(points, rest, count, rho, alpha, rules.threshold, rules.gap, near, run)
             if size < least_points:
                 break
-            start, end = _trim(points, run, size, margin)
+            start, end = _trim(points, run, size, rules.margin)
             kept = end - start
             if kept >= least_points:
                 for k in range(kept):
                     near[k] = run[start + k]
-                if _accept(
-                    points,
-                    directions,
-                    near,
-                    kept,
-                    range_var,
-                    least_length,
-                    straight_z,
-                    lines[found],
-                    covs[found],
-                    ends[found],
-                ):
+                if _accept(points, directions, near, kept, rules, lines[found], covs[found], ends[found]):
                     for k in range(kept):
                         members[near[k]] = found
                     found += 1
@@ -239,9 +249,7 @@ def _accept(
     directions: FloatArray,
     index: IntArray,
     count: int,
-    range_var: float,
-    least_length: float,
-    straight_z: float,
+    rules: LineRules,
     line: FloatArray,
     cov: FloatArray,
     end: FloatArray,
@@ -254,10 +262,10 @@ def _accept(
         off = points[i, 0] * c + points[i, 1] * s - rho
         end[2 * side] = points[i, 0] - off * c
         end[2 * side + 1] = points[i, 1] - off * s
-    if math.hypot(end[2] - end[0], end[3] - end[1]) < least_length:
+    if math.hypot(end[2] - end[0], end[3] - end[1]) < rules.least_length:
         return False
-    if not is_straight(points, directions, index, count, rho, alpha, range_var, straight_z):
+    if not is_straight(points, directions, index, count, rho, alpha, rules.range_var, rules.straight_z):
         return False
     line[0], line[1] = rho, wrap(alpha)
-    line_covariance(points, directions, index, count, alpha, range_var, cov)
+    line_covariance(points, directions, index, count, alpha, rules.range_var, cov)
     return True

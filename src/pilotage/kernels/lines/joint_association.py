@@ -10,7 +10,7 @@ from pilotage.kernels.arrays import FloatArray, IntArray
 from pilotage.kernels.filters.ekf import joseph_update2
 from pilotage.kernels.filters.wall_line import innovation_distance, wall_innovation
 from pilotage.kernels.jit import kernel
-from pilotage.kernels.lines.wall_candidates import in_sight, overlap_share
+from pilotage.kernels.lines.wall_candidates import MatchRules, SeenLines, Walls, in_sight, overlap_share
 
 UNMATCHED = -1
 AMBIGUOUS = -2
@@ -22,34 +22,26 @@ MAX_TIES = 64
 def associate(
     pose: FloatArray,
     cov: FloatArray,
-    mount: FloatArray,
-    lines: FloatArray,
-    covs: FloatArray,
-    ends: FloatArray,
-    walls: FloatArray,
-    segments: FloatArray,
-    circles: FloatArray,
+    seen: SeenLines,
+    known: Walls,
+    rules: MatchRules,
     options: IntArray,
     counts: IntArray,
-    joint_gates: FloatArray,
-    margin: float,
-    slack: float,
-    sigmas: float,
-    least_overlap: float,
-    max_nodes: int,
     pairs: IntArray,
 ) -> float:
     """Fill ``pairs`` (L,) with a wall's index, ``UNMATCHED`` or ``AMBIGUOUS``; returns the joint distance.
 
     Neira & Tardos 2001: among the hypotheses whose joint squared Mahalanobis distance passes the gate
-    for their size, ``joint_gates[k]`` for k pairs, that with most pairs, then with the least distance. The
+    for their size, that with most pairs, then with the least distance. The
     joint distance grows by the innovation of each next pair given those before it, that is by one Kalman
     update of a trial state a node. At a leaf each pair must overlap its wall and be in sight from the
     trial pose, which is far better known than the prior; pairs that do not are struck out. A line that
-    another hypothesis as large and within ``margin`` of the best distance explains otherwise is ambiguous.
-    Where ``max_nodes`` or the room for ties were not enough, nothing is proven unique: all pairs are
+    another hypothesis as large and within the margin of the best distance explains otherwise is ambiguous.
+    Where the nodes or the room for ties were not enough, nothing is proven unique: all pairs are
     ambiguous then, and nan is returned.
     """
+    mount, lines, covs, walls = seen.mount, seen.lines, seen.covs, known.normals
+    joint_gates, margin, max_nodes = rules.joint_gates, rules.margin, rules.nodes
     n = lines.shape[0]
     pairs[:] = UNMATCHED
     order = np.empty(n, dtype=np.int64)
@@ -79,10 +71,7 @@ def associate(
     while depth >= 0:
         if depth == depth_count:
             held[:] = current
-            size = _verify(
-                poses[depth], trials[depth], mount, lines, ends, walls, segments, circles,
-                held, slack, sigmas, least_overlap,
-            )  # fmt: skip
+            size = _verify(poses[depth], trials[depth], seen, known, rules, held)
             distance = distances[depth]
             if size > best_size:
                 tie_count = 0
@@ -140,27 +129,18 @@ def associate(
 
 @kernel
 def _verify(
-    pose: FloatArray,
-    cov: FloatArray,
-    mount: FloatArray,
-    lines: FloatArray,
-    ends: FloatArray,
-    walls: FloatArray,
-    segments: FloatArray,
-    circles: FloatArray,
-    held: IntArray,
-    slack: float,
-    sigmas: float,
-    least_overlap: float,
+    pose: FloatArray, cov: FloatArray, seen: SeenLines, known: Walls, rules: MatchRules, held: IntArray
 ) -> int:
     """Strike out the pairs that do not hold from the pose that a hypothesis implies; returns how many do."""
+    mount, ends, segments = seen.mount, seen.ends, known.segments
     size = 0
-    for i in range(lines.shape[0]):
+    for i in range(ends.shape[0]):
         w = held[i]
         if w < 0:
             continue
-        share = overlap_share(pose, cov, mount, ends[i], walls[w, 1], segments[w], slack, sigmas)
-        if share >= least_overlap and in_sight(pose, mount, ends[i], w, segments, circles):
+        alpha = known.normals[w, 1]
+        share = overlap_share(pose, cov, mount, ends[i], alpha, segments[w], rules.slack, rules.sigmas)
+        if share >= rules.least_overlap and in_sight(pose, mount, ends[i], w, segments, known.circles):
             size += 1
         else:
             held[i] = UNMATCHED

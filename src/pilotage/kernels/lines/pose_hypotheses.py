@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,6 +15,23 @@ from pilotage.kernels.lines.wall_candidates import overlap_share
 from pilotage.kernels.scans.rays import fan_ranges
 
 EXPLAINED, OPEN, CONTRADICTED = range(3)
+
+
+class Expected(NamedTuple):
+    """What a map makes one expect of a scanner, and how far a reading may be from that (m).
+
+    ``first`` is the angle of its first beam, ``step`` that between two. ``eyes`` (V, 2) are the places of
+    scanners whose scans are joined to it, x along the first beam.
+    """
+
+    first: float
+    step: float
+    max_range: float
+    near: float
+    beyond: float
+    eyes: FloatArray
+    segments: FloatArray
+    circles: FloatArray
 
 
 @kernel
@@ -84,41 +102,29 @@ def pair_poses(
 
 @kernel
 def scan_fit(
-    x: float,
-    y: float,
-    first: float,
-    step: float,
-    ranges: FloatArray,
-    max_range: float,
-    stride: int,
-    near: float,
-    beyond: float,
-    eyes: FloatArray,
-    segments: FloatArray,
-    circles: FloatArray,
+    expected: Expected, x: float, y: float, heading: float, ranges: FloatArray, stride: int
 ) -> tuple[float, float]:
     """Shares of every ``stride``-th beam that the map explains, and that it contradicts, from a pose.
 
-    Explained: within ``near`` of the map's range. Contradicted: longer than the map's by more than
-    ``beyond``, through what the map says is a wall; a shorter one may be something unexpected. Beams of
-    which nothing is known, NaN, do not count; a scan of none but these is explained. Of a scan that several
-    scanners took, at places ``eyes`` (V, 2), x along its first beam, a beam ends where one of them saw
-    something, which a wall between may hide from the pose itself: what one of them can have seen is not
-    contradicted.
+    ``heading`` is the first beam's. Explained: within ``near`` of the map's range. Contradicted: longer than
+    the map's by more than ``beyond``, through what the map says is a wall; a shorter one may be something
+    unexpected. Beams of which nothing is known, NaN, do not count; a scan of none but these is explained. Of
+    a scan that several scanners took a beam ends where one of them saw something, which a wall between may
+    hide from the pose itself: what one of them can have seen is not contradicted.
     """
     beams = (ranges.shape[0] + stride - 1) // stride
-    expected = fan_ranges(x, y, first, step * stride, beams, max_range, segments, circles)
+    step, most = expected.step * stride, expected.max_range
+    met = fan_ranges(x, y, heading, step, beams, most, expected.segments, expected.circles)
     explained = contradicted = known = 0
     for k in range(beams):
         if math.isnan(ranges[k * stride]):
             continue
         known += 1
-        measured = min(ranges[k * stride], max_range)
-        if abs(measured - expected[k]) <= near:
+        measured = min(ranges[k * stride], most)
+        if abs(measured - met[k]) <= expected.near:
             explained += 1
-        elif measured > expected[k] + beyond:
-            angle = first + k * step * stride
-            seen = _seen_from(x, y, first, angle, measured, max_range, near, beyond, eyes, segments, circles)
+        elif measured > met[k] + expected.beyond:
+            seen = _seen_from(expected, x, y, heading, heading + k * expected.step * stride, measured)
             explained += int(seen == EXPLAINED)
             contradicted += int(seen == CONTRADICTED)
     if known == 0:
@@ -127,31 +133,18 @@ def scan_fit(
 
 
 @kernel
-def _seen_from(
-    x: float,
-    y: float,
-    first: float,
-    angle: float,
-    measured: float,
-    max_range: float,
-    near: float,
-    beyond: float,
-    eyes: FloatArray,
-    segments: FloatArray,
-    circles: FloatArray,
-) -> int:
-    """What the end of a beam is to the scanner among ``eyes`` to which it fits the map best.
-
-    ``eyes`` are told in a frame that is turned by ``first``.
-    """
+def _seen_from(expected: Expected, x: float, y: float, heading: float, angle: float, measured: float) -> int:
+    """What the end of a beam is to the scanner among the eyes to which it fits the map best."""
     best = CONTRADICTED
-    c, s = math.cos(first), math.sin(first)
+    near, beyond, eyes = expected.near, expected.beyond, expected.eyes
+    c, s = math.cos(heading), math.sin(heading)
     for i in range(eyes.shape[0]):
         ex, ey = x + c * eyes[i, 0] - s * eyes[i, 1], y + s * eyes[i, 0] + c * eyes[i, 1]
         dx, dy = x + measured * math.cos(angle) - ex, y + measured * math.sin(angle) - ey
         away = math.hypot(dx, dy)
-        met = fan_ranges(ex, ey, math.atan2(dy, dx), 1.0, 1, away + near + beyond, segments, circles)[0]
-        if abs(away - met) <= near or (measured >= max_range and met > away):
+        most = away + near + beyond
+        met = fan_ranges(ex, ey, math.atan2(dy, dx), 1.0, 1, most, expected.segments, expected.circles)[0]
+        if abs(away - met) <= near or (measured >= expected.max_range and met > away):
             return EXPLAINED
         if away <= met + beyond:
             best = OPEN
@@ -160,28 +153,19 @@ def _seen_from(
 
 @kernel
 def fitting_poses(
+    expected: Expected,
     poses: FloatArray,
-    first: float,
-    step: float,
     ranges: FloatArray,
-    max_range: float,
     stride: int,
-    near: float,
-    beyond: float,
-    eyes: FloatArray,
     least_explained: float,
     most_contradicted: float,
-    segments: FloatArray,
-    circles: FloatArray,
 ) -> FloatArray:
     """Indices and explained shares (K, 2) of the sensor poses (H, 3) that fit the scan, best first."""
     kept = np.empty((poses.shape[0], 2))
     count = 0
     for h in range(poses.shape[0]):
-        explained, contradicted = scan_fit(
-            poses[h, 0], poses[h, 1], poses[h, 2] + first, step, ranges, max_range, stride, near, beyond,
-            eyes, segments, circles,
-        )  # fmt: skip
+        x, y, heading = poses[h, 0], poses[h, 1], poses[h, 2] + expected.first
+        explained, contradicted = scan_fit(expected, x, y, heading, ranges, stride)
         if explained >= least_explained and contradicted <= most_contradicted:
             kept[count, 0] = h
             kept[count, 1] = explained

@@ -7,7 +7,7 @@ import numpy as np
 from pilotage.kernels.arrays import FloatArray, IntArray
 from pilotage.kernels.jit import kernel
 from pilotage.kernels.lines.clustering import scan_clusters, scan_points
-from pilotage.kernels.lines.extraction import extract_lines
+from pilotage.kernels.lines.extraction import LineRules, extract_lines
 
 
 @kernel
@@ -18,14 +18,7 @@ def lines_of_scan(
     max_range: float,
     cutoff: float,
     least_cluster: int,
-    range_var: float,
-    threshold: float,
-    gap: float,
-    margin: float,
-    least_points: int,
-    least_length: float,
-    straight_z: float,
-    iterations: int,
+    rules: LineRules,
     uniforms: FloatArray,
     most_lines: int,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, IntArray, IntArray]:
@@ -41,22 +34,5 @@ def lines_of_scan(
     clusters = scan_clusters(ranges, points, step, max_range, cutoff, least_cluster)
     lines, covs = np.empty((most_lines, 2)), np.empty((most_lines, 2, 2))
     ends, members = np.empty((most_lines, 4)), np.empty(ranges.shape[0], np.int64)
-    count = extract_lines(
-        points,
-        directions,
-        clusters,
-        range_var,
-        threshold,
-        gap,
-        margin,
-        least_points,
-        least_length,
-        straight_z,
-        iterations,
-        uniforms,
-        lines,
-        covs,
-        ends,
-        members,
-    )
+    count = extract_lines(points, directions, clusters, rules, uniforms, lines, covs, ends, members)
     return lines[:count], covs[:count], ends[:count], points, clusters, members

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,6 +18,67 @@ SIGHT_MARGIN_M = 0.1
 BESIDE_M = 0.3
 """A line that is no wall's is held against a belief only so near to one: whatever stands in a room lies in
 front of one of its walls, and that a belief is off by more the whole scan shows."""
+
+
+class SeenLines(NamedTuple):
+    """The lines of a scan, in the scanner's frame.
+
+    Attributes
+    ----------
+    mount
+        (3,) pose of the scanner in the base frame.
+    lines, covs, ends
+        (L, 2) rho and alpha, (L, 2, 2) their covariances, (L, 4) x0, y0, x1, y1 of their extents.
+    """
+
+    mount: FloatArray
+    lines: FloatArray
+    covs: FloatArray
+    ends: FloatArray
+
+
+class Walls(NamedTuple):
+    """The walls of the map.
+
+    Attributes
+    ----------
+    normals, line_of, segments
+        (W, 2) rho and alpha, (W,) the infinite line that a wall lies on, (W, 4) x0, y0, x1, y1.
+    circles
+        (C, 3) what hides them besides.
+    """
+
+    normals: FloatArray
+    line_of: IntArray
+    segments: FloatArray
+    circles: FloatArray
+
+
+class MatchRules(NamedTuple):
+    """When a line may be a wall.
+
+    Attributes
+    ----------
+    gate, joint_gates
+        Greatest squared Mahalanobis distance of a line alone, and of k lines together, ``joint_gates[k]``.
+    margin
+        Another explanation no farther than this from the best one makes a line ambiguous.
+    slack, sigmas
+        By which a wall is lengthened, as of ``overlap_share``.
+    least_overlap
+        Share of a line that must lie beside its wall.
+    options, nodes
+        Walls considered for one line, and trial updates, at most.
+    """
+
+    gate: float
+    joint_gates: FloatArray
+    margin: float
+    slack: float
+    sigmas: float
+    least_overlap: float
+    options: int
+    nodes: int
 
 
 @kernel
@@ -94,17 +156,9 @@ def in_sight(
 def candidates(
     pose: FloatArray,
     cov: FloatArray,
-    mount: FloatArray,
-    lines: FloatArray,
-    covs: FloatArray,
-    ends: FloatArray,
-    walls: FloatArray,
-    line_of: IntArray,
-    segments: FloatArray,
-    gate: float,
-    slack: float,
-    sigmas: float,
-    least_overlap: float,
+    seen: SeenLines,
+    known: Walls,
+    rules: MatchRules,
     out: IntArray,
     distance: FloatArray,
 ) -> IntArray:
@@ -115,6 +169,9 @@ def candidates(
     deviations of the pose. Of walls on one infinite line, which a measurement cannot tell apart, the one with
     the greatest overlap stands for all.
     """
+    mount, lines, covs, ends = seen.mount, seen.lines, seen.covs, seen.ends
+    walls, line_of, segments = known.normals, known.line_of, known.segments
+    gate, slack, sigmas = rules.gate, rules.slack, rules.sigmas
     count = np.zeros(lines.shape[0], dtype=np.int64)
     z, H, v = np.empty(2), np.empty((2, 3)), np.empty(2)
     c, s = math.cos(pose[2]), math.sin(pose[2])
@@ -156,7 +213,7 @@ def candidates(
                 if nis > gate and away > beside:
                     continue
                 share = overlap_share(pose, cov, mount, ends[i], walls[w, 1], segments[w], slack, sigmas)
-                if share < least_overlap:
+                if share < rules.least_overlap:
                     continue
                 distance[i] = min(distance[i], nis)
                 if nis > gate:

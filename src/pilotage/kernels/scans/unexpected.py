@@ -131,38 +131,3 @@ def seen_through(
                 break
         out[i] = gone
     return out
-
-
-@kernel
-def gone_discs(
-    discs: FloatArray,
-    passed: IntArray,
-    looked: BoolArray,
-    ranges: FloatArray,
-    x: float,
-    y: float,
-    first: float,
-    step: float,
-    reach: float,
-    beyond: float,
-    spread: float,
-    spread_rad: float,
-    most: float,
-    px: float,
-    py: float,
-    inside: float,
-    scans: int,
-) -> tuple[BoolArray, bool]:
-    """Which discs (N, 3) were ``seen_through`` by so many scans in a row, and whether any.
-
-    ``passed`` (N,): by how many so far, in place; through those not ``looked`` at (N,) nothing saw. Ranges
-    longer than ``most`` saw that far. Where the robot stands, within ``inside`` of (px, py), nothing else
-    does.
-    """
-    gone = seen_through(discs, ranges, x, y, first, step, reach, beyond, spread, spread_rad, most)
-    some = False
-    for i in range(discs.shape[0]):
-        passed[i] = passed[i] + 1 if gone[i] and looked[i] else 0
-        gone[i] = passed[i] >= scans or math.hypot(discs[i, 0] - px, discs[i, 1] - py) < inside
-        some |= gone[i]
-    return gone, some

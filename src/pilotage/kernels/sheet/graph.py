@@ -13,6 +13,7 @@ import math
 import numpy as np
 
 from pilotage.kernels.arrays import FloatArray, IntArray
+from pilotage.kernels.filters.arrow_solve import Arrow
 from pilotage.kernels.jit import kernel
 
 STATES = 4
@@ -31,14 +32,11 @@ def _add_chain(
     shared: FloatArray,
     residual: float,
     weight: float,
-    diagonal: FloatArray,
-    coupling: FloatArray,
-    border: FloatArray,
-    corner: FloatArray,
-    right: FloatArray,
-    right_corner: FloatArray,
+    arrow: Arrow,
 ) -> None:
     """Add a factor between keyframes i and i + 1 and the systematic errors."""
+    diagonal, coupling, border = arrow.diagonal, arrow.coupling, arrow.border
+    right, right_corner, corner = arrow.right, arrow.right_corner, arrow.corner
     for r in range(STATES):
         a, b = weight * first[r], weight * second[r]
         right[i, r] -= a * residual
@@ -64,12 +62,7 @@ def add_odometry(
     steps: FloatArray,
     spreads: FloatArray,
     n: int,
-    diagonal: FloatArray,
-    coupling: FloatArray,
-    border: FloatArray,
-    corner: FloatArray,
-    right: FloatArray,
-    right_corner: FloatArray,
+    arrow: Arrow,
 ) -> None:
     """Add what encoders and gyroscope say between each keyframe and the next.
 
@@ -125,10 +118,7 @@ def add_odometry(
                 residual = poses[i + 1, 3] - bias
                 first[3], second[3] = -1.0, 1.0
             weight = 1.0 / spreads[i, row] ** 2
-            _add_chain(
-                i, first, second, shared, residual, weight,
-                diagonal, coupling, border, corner, right, right_corner,
-            )  # fmt: skip
+            _add_chain(i, first, second, shared, residual, weight, arrow)
 
 
 @kernel
@@ -190,11 +180,7 @@ def add_landmarks(
     n: int,
     is_beam: bool,
     robust: float,
-    diagonal: FloatArray,
-    border: FloatArray,
-    corner: FloatArray,
-    right: FloatArray,
-    right_corner: FloatArray,
+    arrow: Arrow,
 ) -> float:
     """Add beams that hit walls, or points where a line on the floor was crossed; returns the cost.
 
@@ -211,6 +197,8 @@ def add_landmarks(
     robust
         A residual of this many standard deviations weighs a quarter (Geman and McClure's kernel).
     """
+    diagonal, border, corner = arrow.diagonal, arrow.border, arrow.corner
+    right, right_corner = arrow.right, arrow.right_corner
     j = np.empty(5)
     cost = 0.0
     for k in range(n):

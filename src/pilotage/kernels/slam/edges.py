@@ -12,6 +12,7 @@ The logarithm of (u, phi) is ``(V(phi)^-1 u, phi)`` with ``V^-1 = [[a, phi/2], [
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,6 +20,43 @@ from pilotage.kernels.arrays import BoolArray, FloatArray, IntArray
 from pilotage.kernels.jit import kernel
 
 SQUARE, HUBER, CAUCHY, GEMAN_MCCLURE, DCS = 0, 1, 2, 3, 4
+
+
+class Edges(NamedTuple):
+    """The edges of a graph: poses i and j (M,), measurements z (M, 3), information matrices (M, 3, 3)."""
+
+    i: IntArray
+    j: IntArray
+    z: FloatArray
+    information: FloatArray
+
+
+class Doubts(NamedTuple):
+    """Kind of a robust loss, its scale in standard deviations, and the edges (M,) that have it."""
+
+    kind: int
+    scale: float
+    edges: BoolArray
+
+
+class Pattern(NamedTuple):
+    """Order of elimination of a graph and its factor's pattern; good for all poses of the same edges.
+
+    Attributes
+    ----------
+    column
+        (N,) the column of each pose in the factor, negative for a fixed one.
+    column_start, rows
+        Of the blocks below the diagonal, column by column.
+    places, turned
+        (M,) of the edges' blocks (``pattern_places``).
+    """
+
+    column: IntArray
+    column_start: IntArray
+    rows: IntArray
+    places: IntArray
+    turned: IntArray
 
 
 @kernel
@@ -104,10 +142,9 @@ def edge_jacobian(a: FloatArray, b: FloatArray, z: FloatArray, first: FloatArray
 
 
 @kernel
-def squared_errors(
-    poses: FloatArray, i: IntArray, j: IntArray, z: FloatArray, information: FloatArray
-) -> FloatArray:
+def squared_errors(poses: FloatArray, edges: Edges) -> FloatArray:
     """``e' Omega e`` of each edge: (M,)."""
+    i, j, z, information = edges
     out = np.empty(i.size)
     e = np.empty(3)
     for k in range(i.size):
@@ -128,8 +165,9 @@ def _weighed(e: FloatArray, w: FloatArray) -> float:
 
 
 @kernel
-def objective(squares: FloatArray, kind: int, scale: float, doubted: BoolArray) -> float:
-    """Half the sum of the losses; only ``doubted`` edges (M,) have a robust one."""
+def objective(squares: FloatArray, doubts: Doubts) -> float:
+    """Half the sum of the losses; only doubted edges have a robust one."""
+    kind, scale, doubted = doubts
     total = 0.0
     for k in range(squares.size):
         total += robust(kind, scale, squares[k])[0] if doubted[k] else squares[k]
@@ -139,31 +177,20 @@ def objective(squares: FloatArray, kind: int, scale: float, doubted: BoolArray) 
 @kernel
 def normal_equations(
     poses: FloatArray,
-    i: IntArray,
-    j: IntArray,
-    z: FloatArray,
-    information: FloatArray,
-    kind: int,
-    scale: float,
-    doubted: BoolArray,
-    column: IntArray,
-    places: IntArray,
-    turned: IntArray,
+    edges: Edges,
+    doubts: Doubts,
+    pattern: Pattern,
     diagonal: FloatArray,
     below: FloatArray,
     right: FloatArray,
 ) -> None:
     """Normal equations ``H dx = right`` of the step from ``poses``, edges weighed by their loss's slope.
 
-    Parameters
-    ----------
-    column
-        (N,) the column of each pose in the factor, negative for a fixed one.
-    places, turned
-        (M,) of the edges' blocks (``pattern_places``).
-    diagonal, below, right
-        (n, 9), (L, 9) and (n, 3): overwritten.
+    ``diagonal`` (n, 9), ``below`` (L, 9) and ``right`` (n, 3) are overwritten.
     """
+    i, j, z, information = edges
+    kind, scale, doubted = doubts
+    column, places, turned = pattern.column, pattern.places, pattern.turned
     diagonal[:] = 0.0
     below[:] = 0.0
     right[:] = 0.0
@@ -214,8 +241,9 @@ def _add_right(weighed: FloatArray, e: FloatArray, out: FloatArray) -> None:
 
 
 @kernel
-def weights(squares: FloatArray, kind: int, scale: float, doubted: BoolArray) -> FloatArray:
+def weights(squares: FloatArray, doubts: Doubts) -> FloatArray:
     """Slope of the loss of each edge: (M,)."""
+    kind, scale, doubted = doubts
     out = np.ones(squares.size)
     for k in range(squares.size):
         if doubted[k]:

@@ -276,18 +276,16 @@ def follow(
         walls = walls[_walls(seen, step, led, dt_s, track, map_, views, out)]
         # A line is fitted where it is asked for: of a keyframe through every point.
         every = _every(walls.shape[0])
-        light = lines_of(points, hit, walls[::every].copy(), 0.0, 0.0, recording.step_rad[i])
+        light = lines_of(points, hit, walls[::every].copy(), recording.step_rad[i])
         if not _is_sure(light, led, others, prior, track, map_, out):
-            kept = light if every == 1 else lines_of(points, hit, walls, 0.0, 0.0, recording.step_rad[i])
+            kept = light if every == 1 else lines_of(points, hit, walls, recording.step_rad[i])
             return i, DOUBT, seen, kept, light
         move_anchor(recording, i, step, others, between(track.pose, out.pose))
         settle(out.pose, out.hessian, out.start, out.told, step, led, dt_s, prior, track)
         if is_new(between(track.keyframe, track.pose), limits[2], limits[3]) or leaves(
             track, out.told[0], led
         ):
-            every_line = (
-                light if every == 1 else lines_of(points, hit, walls, 0.0, 0.0, recording.step_rad[i])
-            )
+            every_line = light if every == 1 else lines_of(points, hit, walls, recording.step_rad[i])
             keep(i, seen, every_line, out.hessian, led, local, track, map_, views, keyframes)
         poses[i], owners[i] = out.pose, keyframes.added[0] - 1
     return end, ENDED, seen, kept, light

@@ -12,30 +12,22 @@ import math
 
 import numpy as np
 
-from pilotage.kernels.arrays import FloatArray, IntArray
+from pilotage.kernels.arrays import FloatArray
 from pilotage.kernels.jit import kernel
 from pilotage.kernels.slam.block_cholesky import factorize, solve_lower, solve_upper
+from pilotage.kernels.slam.edges import Edges, Pattern
 
 
 @kernel
-def chordal_poses(
-    poses: FloatArray,
-    i: IntArray,
-    j: IntArray,
-    z: FloatArray,
-    information: FloatArray,
-    column: IntArray,
-    column_start: IntArray,
-    rows: IntArray,
-    places: IntArray,
-    turned: IntArray,
-) -> tuple[FloatArray, bool]:
-    """Poses (N, 3) from the measurements alone; fixed ones (``column`` < 0) are as in ``poses``.
+def chordal_poses(poses: FloatArray, edges: Edges, pattern: Pattern) -> tuple[FloatArray, bool]:
+    """Poses (N, 3) from the measurements alone; fixed ones are as in ``poses``.
 
     Returns
     -------
     The poses and whether both problems could be solved (their matrices were positive definite).
     """
+    i, j, z, information = edges
+    column, column_start, rows, places, turned = pattern
     n = column_start.size - 1
     out = poses.copy()
     diagonal, below, right = np.zeros((n, 9)), np.zeros((rows.size, 9)), np.zeros((n, 3))

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from pilotage.kernels.arrays import BoolArray, FloatArray, IntArray
+from pilotage.kernels.arrays import FloatArray
 from pilotage.kernels.jit import kernel
 from pilotage.kernels.slam.block_cholesky import factorize, solve_lower, solve_upper
-from pilotage.kernels.slam.edges import normal_equations, objective, squared_errors
+from pilotage.kernels.slam.edges import Doubts, Edges, Pattern, normal_equations, objective, squared_errors
 
 CONVERGED, OUT_OF_ITERATIONS, STALLED, NOT_FINITE = 0, 1, 2, 3
 FIRST_DAMPING = 1e-9
@@ -27,36 +27,27 @@ NEGLIGIBLE = 1e-12
 @kernel
 def levenberg_marquardt(
     poses: FloatArray,
-    i: IntArray,
-    j: IntArray,
-    z: FloatArray,
-    information: FloatArray,
-    kind: int,
-    scale: float,
-    doubted: BoolArray,
-    column: IntArray,
-    column_start: IntArray,
-    rows: IntArray,
-    places: IntArray,
-    turned: IntArray,
+    edges: Edges,
+    doubts: Doubts,
+    pattern: Pattern,
     tolerance: float,
     most_iterations: int,
 ) -> tuple[FloatArray, float, int, int]:
     """Minimize the objective from ``poses`` (N, 3).
 
-    Arguments as in ``normal_equations``; ``tolerance`` is the share of the objective that a step may still
-    promise when the search ends.
+    ``tolerance`` is the share of the objective that a step may still promise when the search ends.
 
     Returns
     -------
     Poses, objective, iterations (factorizations), and a status.
     """
+    column, column_start, rows = pattern.column, pattern.column_start, pattern.rows
     n = column_start.size - 1
     diagonal, below = np.empty((n, 9)), np.empty((rows.size, 9))
     factor_diagonal, factor_below = np.empty((n, 9)), np.empty((rows.size, 9))
     right, step, trial = np.empty((n, 3)), np.empty((n, 3)), poses.copy()
     poses = poses.copy()
-    value = objective(squared_errors(poses, i, j, z, information), kind, scale, doubted)
+    value = objective(squared_errors(poses, edges), doubts)
     if not np.isfinite(value):
         return poses, value, 0, NOT_FINITE
     if n == 0 or value <= NEGLIGIBLE:
@@ -64,22 +55,7 @@ def levenberg_marquardt(
     damping, growth, fresh = FIRST_DAMPING, GROWTH, True
     for iteration in range(1, most_iterations + 1):
         if fresh:
-            normal_equations(
-                poses,
-                i,
-                j,
-                z,
-                information,
-                kind,
-                scale,
-                doubted,
-                column,
-                places,
-                turned,
-                diagonal,
-                below,
-                right,
-            )
+            normal_equations(poses, edges, doubts, pattern, diagonal, below, right)
         factor_diagonal[:], factor_below[:] = diagonal, below
         least = LEAST_DIAGONAL * diagonal.max()
         for k in range(n):
@@ -102,7 +78,7 @@ def levenberg_marquardt(
                 if column[p] >= 0:
                     for r in range(3):
                         trial[p, r] = poses[p, r] + step[column[p], r]
-            new = objective(squared_errors(trial, i, j, z, information), kind, scale, doubted)
+            new = objective(squared_errors(trial, edges), doubts)
             gained = new < value
             ended = promised <= tolerance * value + NEGLIGIBLE
             gain = (value - new) / max(promised, 1e-300)

@@ -61,10 +61,8 @@ def polar(points: FloatArray) -> FloatArray:
 
 
 @kernel
-def _went_on(
-    view: FloatArray, count: int, bearing: float, r: float, margin_m: float, beside_m: float
-) -> bool:
-    """Whether all beams of a view that pass a place within ``beside_m``, two at least on either side, did."""
+def _went_on(view: FloatArray, count: int, bearing: float, r: float) -> bool:
+    """Whether all beams of a view that pass a place within ``BESIDE_M``, two at least on either side, did."""
     at = int(bearing / max(view[count - 1, 0], 1e-9) * (count - 1))
     at = min(max(at, 0), count)
     while at < count and view[at, 0] < bearing:
@@ -73,14 +71,14 @@ def _went_on(
         at -= 1
     if not 2 <= at <= count - 2:
         return False
-    beside = beside_m / r
+    beside = BESIDE_M / r
     for step in (-1, 1):
         m, passed = at if step == 1 else at - 1, 0
         while 0 <= m < count:
             away = abs(view[m, 0] - bearing)
             if passed >= 2 and away > beside:
                 break
-            if not (view[m, 1] > r + margin_m and away < beside + GAP_RAD):
+            if not (view[m, 1] > r + MARGIN_M and away < beside + GAP_RAD):
                 return False
             passed += 1
             m += step
@@ -159,7 +157,7 @@ def seen_through(points: FloatArray, pose: FloatArray, known: BoolArray, views: 
             bearing = bearing_of(x, y) - view[count, 0]
             if bearing < 0.0:
                 bearing += 2.0 * math.pi
-            if _went_on(view, count, bearing, math.sqrt(square), MARGIN_M, BESIDE_M):
+            if _went_on(view, count, bearing, math.sqrt(square)):
                 told[k] += 1
                 out[k] = told[k] >= VOTES
     return out
@@ -195,7 +193,7 @@ def looked_through(
         bearing = (bearing_of(x, y) - view[count, 0]) % (2.0 * math.pi)
         if bearing <= last:
             asked += 1
-            through += _went_on(view, count, bearing, math.sqrt(square), MARGIN_M, BESIDE_M)
+            through += _went_on(view, count, bearing, math.sqrt(square))
     return through, asked
 
 

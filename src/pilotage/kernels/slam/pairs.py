@@ -11,19 +11,16 @@ from pilotage.kernels.slam.buckets import sort_into_buckets
 from pilotage.kernels.slam.frames import between, gathered
 
 BUCKET_M = 0.15
+SPREAD = 2
+"""So many scans before and after the reference lend it their points. None where the moving scan is near the
+reference itself."""
+REACH_M, LAST_REACH_M, SCALE_M = 0.3, 0.12, 0.03
+"""As in ``align``."""
 
 
 @kernel
 def align_pairs(
-    points: FloatArray,
-    starts: IntArray,
-    poses: FloatArray,
-    pairs: IntArray,
-    spread: int,
-    reach_m: float,
-    final_reach_m: float,
-    scale_m: float,
-    prior: FloatArray,
+    points: FloatArray, starts: IntArray, poses: FloatArray, pairs: IntArray, prior: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, IntArray]:
     """Align scans with the surroundings of others, each from where the poses have it.
 
@@ -35,10 +32,7 @@ def align_pairs(
         (S, 3) in one frame.
     pairs
         (M, 2) reference and moving scan, sorted by the reference.
-    spread
-        How many scans before and after the reference lend it their points. None where the moving scan
-        is near the reference itself.
-    reach_m, final_reach_m, scale_m, prior
+    prior
         As in ``align``.
 
     Returns
@@ -56,10 +50,10 @@ def align_pairs(
     box, bucket_starts, _, sorted_points = sort_into_buckets(points[:0], BUCKET_M)
     for m in range(count):
         i, j = pairs[m, 0], pairs[m, 1]
-        lone = abs(i - j) <= spread + 4
+        lone = abs(i - j) <= SPREAD + 4
         if i != have or lone != have_lone:
-            before = i if lone else max(0, i - spread)
-            after = i + 1 if lone else min(scans, i + spread + 1)
+            before = i if lone else max(0, i - SPREAD)
+            after = i + 1 if lone else min(scans, i + SPREAD + 1)
             cloud = gathered(points, starts, np.arange(before, after), poses, poses[i])
             box, bucket_starts, _, sorted_points = sort_into_buckets(cloud, BUCKET_M)
             have, have_lone = i, lone
@@ -67,9 +61,9 @@ def align_pairs(
             points[starts[j] : starts[j + 1]],
             between(poses[i], poses[j]),
             prior,
-            reach_m,
-            final_reach_m,
-            scale_m,
+            REACH_M,
+            LAST_REACH_M,
+            SCALE_M,
             30,
             box,
             bucket_starts,

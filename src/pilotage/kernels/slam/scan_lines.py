@@ -50,17 +50,14 @@ def scan_points(
 
 
 @kernel
-def lines_of(
-    points: FloatArray, hit: BoolArray, beams: IntArray, origin_x: float, origin_y: float, step_rad: float
-) -> FloatArray:
+def lines_of(points: FloatArray, hit: BoolArray, beams: IntArray, step_rad: float) -> FloatArray:
     """(K, 6) of ``scan_lines`` of some of the beams (K,) that hit something alone."""
     count = points.shape[0]
     out = np.empty((beams.shape[0], 6))
     for k in range(beams.shape[0]):
         i = beams[k]
         px, py = points[i, 0], points[i, 1]
-        dx, dy = px - origin_x, py - origin_y
-        r = math.sqrt(dx * dx + dy * dy)
+        r = math.sqrt(px * px + py * py)
         grazing = 4.0 * r * step_rad
         n = 1.0
         sx = sy = sxx = sxy = syy = 0.0
@@ -107,7 +104,7 @@ def lines_of(
                 nx, ny = math.sqrt(0.5 - 0.5 * half / root), math.sqrt(0.5 + 0.5 * half / root)
                 if cxy > 0.0:
                     nx = -nx
-                if nx * dx + ny * dy > 0.0:
+                if nx * px + ny * py > 0.0:
                     nx, ny = -nx, -ny
                 out[k, 2] = nx
                 out[k, 3] = ny
@@ -118,9 +115,7 @@ def lines_of(
 
 
 @kernel
-def scan_lines(
-    points: FloatArray, hit: BoolArray, origin_x: float, origin_y: float, step_rad: float
-) -> FloatArray:
+def scan_lines(points: FloatArray, hit: BoolArray, step_rad: float) -> FloatArray:
     """Fit a line through the neighbours of every hit, by total least squares.
 
     Neighbours are the beams beside it up to the first gap: a hit further from the one before than a surface
@@ -130,9 +125,7 @@ def scan_lines(
     Parameters
     ----------
     points, hit
-        (B, 2) and (B,) from ``scan_points``.
-    origin_x, origin_y
-        Where the scanner is; normals point to its side.
+        (B, 2) and (B,) from ``scan_points``; the scanner is at the origin, and normals point to its side.
     step_rad
         Angle between beams.
 
@@ -140,7 +133,7 @@ def scan_lines(
     -------
     (K, 6): x, y as measured, the normal's x and y (both 0 where no line holds), x, y on the line.
     """
-    return lines_of(points, hit, np.flatnonzero(hit), origin_x, origin_y, step_rad)
+    return lines_of(points, hit, np.flatnonzero(hit), step_rad)
 
 
 @kernel
@@ -149,4 +142,4 @@ def scan_cloud(
 ) -> FloatArray:
     """Points (K, 6) of ``scan_lines`` from ranges (B,) along rays (B, 2)."""
     points, hit = scan_points(ranges_m, rays, nearest_m, farthest_m)
-    return scan_lines(points, hit, 0.0, 0.0, step_rad)
+    return scan_lines(points, hit, step_rad)

@@ -61,14 +61,14 @@ class BarnPage:
     without_way
         Worlds that nobody drove because the robot does not fit through.
     replays
-        (controller, run, link) of runs that have a page of their own.
+        Links of runs that have a page of their own, by controller, world and trial.
     """
 
     runs: Runs
     published: Runs
     clearance_m: Mapping[int, float]
     without_way: Sequence[int] = ()
-    replays: Sequence[tuple[str, BarnRun, str]] = field(default_factory=tuple)
+    replays: Mapping[tuple[str, int, int], str] = field(default_factory=dict)
 
 
 def write_barn_report(folder: Path, shown: BarnPage) -> Path:
@@ -135,11 +135,10 @@ def _row(name: str, runs: Sequence[BarnRun]) -> list[str]:
 
 def _worst(shown: BarnPage) -> Section:
     rows = []
-    links = {(name, run.world, run.trial): link for name, run, link in shown.replays}
     for name, runs in shown.runs.items():
         for run in sorted(runs, key=lambda run: (run.metric, -run.time_s))[:WORST]:
             cells = [name, str(run.world), str(run.trial), outcome(run), f"{run.time_s:.2f} s"]
-            link = replay_link(links.get((name, run.world, run.trial)))
+            link = replay_link(shown.replays.get((name, run.world, run.trial)))
             rows.append([*cells, f"{run.metric:.4f}", link])
     heads = ("controller", "course", "trial", "outcome", "time", "metric", "")
     return section("worst", "Worst courses", plain_table(heads, rows))

@@ -11,7 +11,7 @@ from pilotage.kernels.scans import sight
 from pilotage.sensors.beacon import BeaconConfig
 from pilotage.sensors.readings import BeaconReadings
 from pilotage.sim.sensing.noise import NoiseBlocks
-from pilotage.sim.sensing.sensor import SIMULATED_SENSORS, Carrier, mount_of
+from pilotage.sim.sensing.sensor import SIMULATED_SENSORS, Carrier
 
 BLOCK_NUMBERS = 4096
 """About as many normals are drawn at once."""
@@ -41,7 +41,7 @@ class SimulatedBeacons:
         counts = np.zeros(len(sensors), dtype=np.int64)
         arguments = (
             counts,
-            mount_of(config.mount),
+            config.mount.as_array(),
             marks.points_xy_m,
             marks.ids,
             (

@@ -12,7 +12,7 @@ from pilotage.sensors.line_sensor import LineSensorConfig
 from pilotage.sensors.magnetometer import MagnetometerConfig
 from pilotage.sensors.readings import LineReading, MagneticField
 from pilotage.sim.normals import Normals
-from pilotage.sim.sensing.sensor import SIMULATED_SENSORS, Carrier, mount_of
+from pilotage.sim.sensing.sensor import SIMULATED_SENSORS, Carrier
 
 
 @SIMULATED_SENSORS.add(LineSensorConfig)
@@ -22,7 +22,7 @@ class SimulatedLineSensor:
     def __init__(self, config: LineSensorConfig, carrier: Carrier, rng: np.random.Generator) -> None:
         self._floor = carrier.world.check_markings(carrier.where, "line-sensor")
         self._state = carrier.body.state
-        self._mount = mount_of(config.mount)
+        self._mount = config.mount.as_array()
         self._std = config.edge_std_m
         self._normals = Normals(rng)
 

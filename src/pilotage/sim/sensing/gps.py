@@ -10,7 +10,7 @@ from pilotage.kernels.scans import mounted
 from pilotage.sensors.gps import GpsConfig
 from pilotage.sensors.readings import GpsFix
 from pilotage.sim.normals import Normals
-from pilotage.sim.sensing.sensor import SIMULATED_SENSORS, Carrier, mount_of
+from pilotage.sim.sensing.sensor import SIMULATED_SENSORS, Carrier
 
 
 @SIMULATED_SENSORS.add(GpsConfig)
@@ -20,7 +20,7 @@ class SimulatedGps:
     def __init__(self, config: GpsConfig, carrier: Carrier, rng: np.random.Generator) -> None:
         self._config = config
         self._state = carrier.body.state
-        self._mount = mount_of(config.mount)
+        self._mount = config.mount.as_array()
         self._keep = math.exp(-carrier.period_s / config.bias_time_s)
         self._renew = config.bias_std_m * math.sqrt(1.0 - self._keep * self._keep)
         self._bias = [float(error) for error in config.bias_std_m * rng.standard_normal(2)]

@@ -11,7 +11,7 @@ from pilotage.kernels.scans import mounted
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan
 from pilotage.sim.sensing.noise import NoiseBlocks
-from pilotage.sim.sensing.sensor import SIMULATED_SENSORS, Carrier, mount_of
+from pilotage.sim.sensing.sensor import SIMULATED_SENSORS, Carrier
 
 BLOCK = 16
 """Scans whose noise is drawn at once."""
@@ -46,7 +46,7 @@ class SimulatedLidar:
         table, owns, values = body.table, body.owns, noise.values
         rows = np.array([sensor._carrier.body.row for sensor in sensors])
         arguments = (
-            mount_of(config.mount),
+            config.mount.as_array(),
             fan_of(config),
             math.sqrt(config.range_var_m2),
             world.fixed,

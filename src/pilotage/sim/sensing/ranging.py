@@ -12,7 +12,7 @@ from pilotage.sensors.infrared import InfraredConfig
 from pilotage.sensors.readings import InfraredReading, UltrasonicReading
 from pilotage.sensors.ultrasonic import UltrasonicConfig
 from pilotage.sim.normals import Normals
-from pilotage.sim.sensing.sensor import SIMULATED_SENSORS, Carrier, mount_of
+from pilotage.sim.sensing.sensor import SIMULATED_SENSORS, Carrier
 
 
 @SIMULATED_SENSORS.add(UltrasonicConfig)
@@ -77,7 +77,7 @@ class SimulatedInfrared:
         self._normals = Normals(rng)
         self._arguments = (
             carrier.body.state,
-            mount_of(config.mount),
+            config.mount.as_array(),
             config.max_range_m,
             world.fixed,
             world.traffic.others,

@@ -6,13 +6,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-import numpy as np
-
 from pilotage.core.checked import Gives
 from pilotage.core.misfit import misfit
-from pilotage.core.types import FloatArray
 from pilotage.sensors.readings import Reading
-from pilotage.sensors.sensor import Mount
 from pilotage.sim.bodies.body import Body
 from pilotage.sim.by_config import ByConfig
 from pilotage.sim.worlds.world import World
@@ -83,8 +79,3 @@ SIMULATED_SENSORS: ByConfig[SimulatedSensor | ReadTogether] = ByConfig(
     Gives("read", "a reading of finite numbers (the reach where nothing is hit), or None", _unfit),
 )
 """Sensor configs to what they would read."""
-
-
-def mount_of(mount: Mount) -> FloatArray:
-    """(3,) pose on the body, for the kernels."""
-    return np.array([mount.x_m, mount.y_m, mount.theta_rad])

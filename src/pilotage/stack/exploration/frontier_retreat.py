@@ -26,7 +26,7 @@ def is_walled_in(room: SheetRoom, cost: FloatArray, visited: BoolArray) -> bool:
     return lost > ENCLOSED_SHARE * len(been)
 
 
-def trail_back(poses: FloatArray, most_m: float = RETREAT_M) -> list[Point]:
+def trail_back(poses: FloatArray) -> list[Point]:
     """Points back along the keyframes (N, >= 2), the newest first; empty where it has not moved."""
     points = [(float(x), float(y)) for x, y in poses[::-1, :2]]
     path, kept, gone = [], points[:1], 0.0
@@ -35,6 +35,6 @@ def trail_back(poses: FloatArray, most_m: float = RETREAT_M) -> list[Point]:
         if math.dist(kept[-1], point) >= STEP_M:
             kept.append(point)
             path.append(point)
-        if gone >= most_m:
+        if gone >= RETREAT_M:
             break
     return path

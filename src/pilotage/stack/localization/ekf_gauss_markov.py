@@ -9,10 +9,9 @@ from itertools import chain
 import numpy as np
 
 from pilotage.core.chi_square import chi_square_quantile, gated_mean
-from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.kernels.filters import ekf, gauss_markov
-from pilotage.kernels.filters.sighting import OUTCOME_ACCEPTED, OUTCOME_GATED, landmark_index
+from pilotage.kernels.filters.sighting import OUTCOME_ACCEPTED, OUTCOME_GATED, Seen, landmark_index
 from pilotage.maps.world_map import WorldMap
 from pilotage.models.odometry import OdometryModel
 from pilotage.sensors.beacon import BeaconConfig
@@ -26,7 +25,12 @@ from pilotage.stack.localization.gauss_markov_config import (
     GaussMarkovError,
     LandmarkError,
 )
-from pilotage.stack.localization.landmark_filter import MEASUREMENT_DOF, SIGHTING_COLUMNS
+from pilotage.stack.localization.landmark_filter import (
+    MEASUREMENT_DOF,
+    SIGHTING_COLUMNS,
+    known_landmarks,
+    reading_variances,
+)
 from pilotage.stack.localization.localizer import LOCALIZERS, require_initial_pose
 from pilotage.stack.localization.odometry_prediction import OdometryPrediction
 from pilotage.stack.localization.odometry_watch import MOST_HEADING_VAR, OdometryWatch
@@ -93,21 +97,12 @@ class EkfGaussMarkovLocalizer:
         self._config = config
         self._odometry, odometry = robot.one_sensor(WheelOdometryConfig, NAME)
         self._beacons, beacons = robot.one_sensor(BeaconConfig, NAME)
-        if len(chart.landmarks) == 0:
-            raise InputError(f"{NAME}: expected a map with landmarks, found none")
+        self._known = known_landmarks(chart, NAME)
         self._noise = OdometryPrediction(odometry, config.odometry, 1.0, OdometryModel.EXACT_ARC)
-        order = np.argsort(chart.landmarks.ids)
-        self._ids = chart.landmarks.ids[order]
-        self._points = chart.landmarks.points_xy_m[order]
-        mount = beacons.mount
-        self._mount = np.array([mount.x_m, mount.y_m, mount.theta_rad, config.reading_age_s])
-        range_var = beacons.range_var_m2 if config.range_var_m2 is None else config.range_var_m2
-        bearing_var = beacons.bearing_var_rad2 if config.bearing_var_rad2 is None else config.bearing_var_rad2
-        if range_var == 0.0 or bearing_var == 0.0:
-            raise InputError(
-                f"{NAME}: a beacon sensor without noise leaves the filter no measurement variance; "
-                "set stack.localizer.range_var_m2 and stack.localizer.bearing_var_rad2 above 0"
-            )
+        self._mount = np.array([*beacons.mount.as_array(), config.reading_age_s])
+        range_var, bearing_var = reading_variances(
+            beacons, config.range_var_m2, config.bearing_var_rad2, NAME
+        )
         self._white = np.array([range_var, config.range_var_fraction, bearing_var, config.across_var_m2])
         along, across = config.landmark_range_error, config.landmark_bearing_error
         self._scales = np.array([along.std, along.std_m, across.std, across.std_m])
@@ -127,7 +122,7 @@ class EkfGaussMarkovLocalizer:
             config.age_error_s,
             config.axis_rad,
         ]
-        count = len(self._ids)
+        count = len(self._known.ids)
         # A landmark's errors are kept in units of their standard deviations.
         self._stationary = np.array([0.0] * 3 + [error.std**2 for error in errors] + [1.0] * (2 * count))
         constant = [[1.0 / error.time_constant_s, 0.0, 0.0] for error in errors]
@@ -254,23 +249,17 @@ class EkfGaussMarkovLocalizer:
             self._begin_anew(least_landmarks=2)
             self._tell(count, 0, 0.0)
             return
-        nis, outcome = np.empty(count), np.empty(count, dtype=np.int64)
-        used = gauss_markov.update_range_bearings(
+        used, nis, outcome = gauss_markov.update_range_bearings(
             self._state,
             self._cov,
-            seen.ids,
-            seen.ranges_m / config.range_scale,
-            seen.bearings_rad,
-            self._ids,
-            self._points,
+            Seen(seen.ids, seen.ranges_m / config.range_scale, seen.bearings_rad),
+            self._known,
             self._mount,
             self._motion,
             self._scales,
             config.depth_power,
             self._white,
             self._gate,
-            nis,
-            outcome,
         )
         total = float(nis[outcome == OUTCOME_ACCEPTED].sum())
         self._check.tell(self._t_s or 0.0, int((outcome >= 0).sum()), used, total, used * self._expected_nis)
@@ -309,7 +298,7 @@ class EkfGaussMarkovLocalizer:
     def _remember(self, seen: BeaconReadings) -> None:
         config = self._config
         for landmark, range_m, bearing in zip(seen.ids, seen.ranges_m, seen.bearings_rad, strict=True):
-            row = landmark_index(self._ids, landmark)
+            row = landmark_index(self._known.ids, landmark)
             if row >= 0:
                 reading = gauss_markov.range_of_depth(
                     range_m / config.range_scale, bearing, config.depth_power
@@ -318,7 +307,7 @@ class EkfGaussMarkovLocalizer:
 
     def _begin_anew(self, least_landmarks: int) -> None:
         """Take the pose that the last seconds' landmarks agree on; the errors stay as believed."""
-        fix = self._recent.fix(self._points, self._reading_cov(), least_landmarks)
+        fix = self._recent.fix(self._known.points, self._reading_cov(), least_landmarks)
         if fix is None or fix.chi2 > chi_square_quantile(self._config.gate, fix.dof):
             return
         self._state[:3] = fix.pose

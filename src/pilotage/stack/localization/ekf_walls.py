@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 from pydantic import Field
 
 from pilotage.core.chi_square import gated_mean
@@ -111,7 +110,7 @@ class EkfWallsLocalizer:
         # Only the covariances are scaled: which points make a line is no matter of belief.
         self._var_scale = config.measurement_var_scale
         self._joint, self._moved_m, self._alike = isinstance(lidar, JointLidarConfig), 0.0, 0
-        self._mount = np.array([lidar.mount.x_m, lidar.mount.y_m, lidar.mount.theta_rad])
+        self._mount = lidar.mount.as_array()
         self._matcher = WallMatcher(config.matching, config.gate, chart.reflectors, self._mount)
         if config.recovery is None:
             require_initial_pose(initial, "ekf-walls without recovery")

@@ -80,9 +80,7 @@ class InvariantEkfLocalizer:
             odometry, config.odometry, config.odometry_var_scale, OdometryModel.EXACT_ARC
         )
         self._motion = GyroOdometry(robot, self._odometry, self._prediction, journal)
-        order = np.argsort(chart.landmarks.ids)
-        self._ids = np.ascontiguousarray(chart.landmarks.ids[order])
-        self._points = np.ascontiguousarray(chart.landmarks.points_xy_m[order])
+        self._ids, self._points = chart.landmarks.by_id()
         told = config.measurement_var_scale * np.array([seer.range_var_m2, seer.bearing_var_rad2])
         self._R = np.diag(np.maximum(told, LEAST_VAR))
         self._gate_probability = config.gate

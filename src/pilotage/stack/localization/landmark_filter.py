@@ -12,7 +12,7 @@ from pydantic import Field
 from pilotage.core.chi_square import chi_square_quantile, gated_mean
 from pilotage.core.config import Config
 from pilotage.core.errors import InputError
-from pilotage.core.types import BoolArray, Pose2
+from pilotage.core.types import BoolArray, FloatArray, IntArray, Pose2
 from pilotage.kernels.filters import sighting
 from pilotage.maps.world_map import WorldMap
 from pilotage.models.odometry import OdometryModel
@@ -70,7 +70,28 @@ class LandmarkFilterConfig(Config):
     widens its covariance. None: never."""
 
 
-Update = Callable[..., int]
+Update = Callable[..., tuple[int, FloatArray, IntArray]]
+
+
+def known_landmarks(chart: WorldMap, name: str) -> sighting.Known:
+    """The landmarks of the robot's map; InputError without any."""
+    if len(chart.landmarks) == 0:
+        raise InputError(f"{name}: expected a map with landmarks, found none")
+    return chart.landmarks.by_id()
+
+
+def reading_variances(
+    sensor: BeaconConfig, range_var_m2: float | None, bearing_var_rad2: float | None, name: str
+) -> tuple[float, float]:
+    """Variances of a range and a bearing, as told or as the data sheet has them; InputError for none."""
+    range_var = sensor.range_var_m2 if range_var_m2 is None else range_var_m2
+    bearing_var = sensor.bearing_var_rad2 if bearing_var_rad2 is None else bearing_var_rad2
+    if range_var == 0.0 or bearing_var == 0.0:
+        raise InputError(
+            f"{name}: a beacon sensor without noise leaves the filter no measurement variance; "
+            "set stack.localizer.range_var_m2 and stack.localizer.bearing_var_rad2 above 0"
+        )
+    return range_var, bearing_var
 
 
 class LandmarkFilter:
@@ -97,24 +118,14 @@ class LandmarkFilter:
         predict, self._update_kernel = self._kernels()
         self._odometry, odometry = robot.one_sensor(WheelOdometryConfig, name)
         self._beacons, beacons = robot.one_sensor(BeaconConfig, name)
-        if len(chart.landmarks) == 0:
-            raise InputError(f"{name}: expected a map with landmarks, found none")
+        self._known = known_landmarks(chart, name)
         self._prediction = OdometryPrediction(
             odometry, config.odometry, config.odometry_var_scale, config.odometry_model, predict
         )
         self._motion = GyroOdometry(robot, self._odometry, self._prediction, journal)
-        order = np.argsort(chart.landmarks.ids)
-        self._ids = chart.landmarks.ids[order]
-        self._points = chart.landmarks.points_xy_m[order]
-        self._mount = np.array([beacons.mount.x_m, beacons.mount.y_m, beacons.mount.theta_rad])
-        range_var = beacons.range_var_m2 if config.range_var_m2 is None else config.range_var_m2
-        bearing_var = beacons.bearing_var_rad2 if config.bearing_var_rad2 is None else config.bearing_var_rad2
-        if range_var == 0.0 or bearing_var == 0.0:
-            raise InputError(
-                f"{name}: a beacon sensor without noise leaves the filter no measurement variance; "
-                "set stack.localizer.range_var_m2 and stack.localizer.bearing_var_rad2 above 0"
-            )
-        self._R = config.measurement_var_scale * np.diag([range_var, bearing_var])
+        self._mount = beacons.mount.as_array()
+        variances = reading_variances(beacons, config.range_var_m2, config.bearing_var_rad2, name)
+        self._R = config.measurement_var_scale * np.diag(variances)
         self._gate_probability = config.gate
         self._gate = chi_square_quantile(config.gate, MEASUREMENT_DOF)
         self._expected_nis = gated_mean(self._gate, MEASUREMENT_DOF)
@@ -162,24 +173,12 @@ class LandmarkFilter:
     def _update(self, seen: BeaconReadings) -> None:
         count = seen.ids.shape[0]
         if self._blind:
-            self._begin_anew(seen, np.isin(seen.ids, self._ids))
+            self._begin_anew(seen, np.isin(seen.ids, self._known.ids))
             self._tell(count, 0, 0.0)
             return
-        nis = np.empty(count)
-        outcome = np.empty(count, dtype=np.int64)
-        used = self._update_kernel(
-            self._pose,
-            self._cov,
-            seen.ids,
-            seen.ranges_m,
-            seen.bearings_rad,
-            self._ids,
-            self._points,
-            self._mount,
-            self._R,
-            self._gate,
-            nis,
-            outcome,
+        sightings = sighting.Seen(seen.ids, seen.ranges_m, seen.bearings_rad)
+        used, nis, outcome = self._update_kernel(
+            self._pose, self._cov, sightings, self._known, self._mount, self._R, self._gate
         )
         known, total = sighting.summed_up(nis, outcome)
         self._check.tell(self._t_s, known, used, total, used * self._expected_nis)
@@ -204,7 +203,7 @@ class LandmarkFilter:
 
     def _begin_anew(self, seen: BeaconReadings, known: BoolArray) -> bool:
         """Take the pose that the beacons agree on, if they do."""
-        points = self._points[np.searchsorted(self._ids, seen.ids[known])]
+        points = self._known.points[np.searchsorted(self._known.ids, seen.ids[known])]
         bearings = seen.bearings_rad[known] - self._bearing_offset_rad
         fix = fix_from_beacons(points, seen.ranges_m[known], bearings, self._mount, self._R)
         if fix is not None and fix.chi2 <= chi_square_quantile(self._gate_probability, fix.dof):

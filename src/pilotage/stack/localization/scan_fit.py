@@ -46,15 +46,19 @@ class ScanFit:
         beyond_m: float,
         eyes_m: FloatArray = NO_EYES,
     ) -> None:
-        self._world = world
-        self._first = float(lidar.beam_angles_rad()[0])
-        self._step = lidar.beam_step_rad
+        first = float(lidar.beam_angles_rad()[0])
+        c, s = math.cos(first), math.sin(first)
         self._mount = lidar.mount
-        self._max_range = min(max_range_m, lidar.max_range_m)
-        self._near = near_m
-        self._beyond = beyond_m
-        c, s = math.cos(self._first), math.sin(self._first)
-        self._eyes = np.ascontiguousarray(eyes_m @ np.array([(c, -s), (s, c)]))
+        self._expected = pose_hypotheses.Expected(
+            first,
+            lidar.beam_step_rad,
+            min(max_range_m, lidar.max_range_m),
+            near_m,
+            beyond_m,
+            np.ascontiguousarray(eyes_m @ np.array([(c, -s), (s, c)])),
+            world.segments_m,
+            world.circles_m,
+        )
 
     def sensor_pose(self, pose: FloatArray) -> tuple[float, float, float]:
         """Pose of the scanner for a pose of the robot (3,)."""
@@ -77,19 +81,9 @@ class ScanFit:
     def of(self, pose: FloatArray, ranges_m: FloatArray, extra_m: float = 0.0) -> Fit:
         """Fit of a scan from a pose (3,) of the robot; ``extra_m`` widens both tolerances."""
         x, y, theta = self.sensor_pose(pose)
+        expected = self._widened(extra_m)
         explained, contradicted = pose_hypotheses.scan_fit(
-            x,
-            y,
-            theta + self._first,
-            self._step,
-            ranges_m,
-            self._max_range,
-            1,
-            self._near + extra_m,
-            self._beyond + extra_m,
-            self._eyes,
-            self._world.segments_m,
-            self._world.circles_m,
+            expected, x, y, theta + expected.first, ranges_m, 1
         )
         return Fit(explained, contradicted)
 
@@ -104,7 +98,8 @@ class ScanFit:
         """
         x, y, theta = self.sensor_pose(pose)
         out = np.empty(len(mates), np.int64)
-        bodies_in_sight(x, y, theta + self._first, self._step, ranges_m, self._max_range, mates, out)
+        first, step, most = self._expected[:3]
+        bodies_in_sight(x, y, theta + first, step, ranges_m, most, mates, out)
         return out
 
     def best(
@@ -117,19 +112,13 @@ class ScanFit:
         most_contradicted: float,
     ) -> FloatArray:
         """The sensor poses (K, 3) among (H, 3) that fit the scan, best first, from every stride-th beam."""
+        expected = self._widened(extra_m)
         kept = pose_hypotheses.fitting_poses(
-            sensor_poses,
-            self._first,
-            self._step,
-            ranges_m,
-            self._max_range,
-            stride,
-            self._near + extra_m,
-            self._beyond + extra_m,
-            self._eyes,
-            least_explained,
-            most_contradicted,
-            self._world.segments_m,
-            self._world.circles_m,
+            expected, sensor_poses, ranges_m, stride, least_explained, most_contradicted
         )
         return sensor_poses[kept[:, 0].astype(np.int64)]
+
+    def _widened(self, extra_m: float) -> pose_hypotheses.Expected:
+        """What is expected, with both tolerances wider."""
+        usual = self._expected
+        return usual._replace(near=usual.near + extra_m, beyond=usual.beyond + extra_m)

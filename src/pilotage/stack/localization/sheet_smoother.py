@@ -184,22 +184,9 @@ class SheetSmoother:
     def _step(self, robust: float) -> None:
         keyframes, landmarks = self.keyframes, self.map
         n, shared = keyframes.count, sheet_graph.SYSTEMATIC + 2 * landmarks.count
-        m = sheet_graph.STATES
-        diagonal, coupling = np.zeros((n, m, m)), np.zeros((n, m, m))
-        border, corner = np.zeros((n, m, shared)), np.zeros((shared, shared))
-        right, right_corner = np.zeros((n, m)), np.zeros(shared)
+        arrow = arrow_solve.no_arrow(n, sheet_graph.STATES, shared)
         sheet_graph.add_odometry(
-            keyframes.poses,
-            keyframes.systematic,
-            keyframes.steps,
-            keyframes.spreads,
-            n,
-            diagonal,
-            coupling,
-            border,
-            corner,
-            right,
-            right_corner,
+            keyframes.poses, keyframes.systematic, keyframes.steps, keyframes.spreads, n, arrow
         )
         for seen, is_beam in ((self.beams, True), (self.crossings, False)):
             sheet_graph.add_landmarks(
@@ -212,28 +199,23 @@ class SheetSmoother:
                 seen.count,
                 is_beam,
                 robust,
-                diagonal,
-                border,
-                corner,
-                right,
-                right_corner,
+                arrow,
             )
-        self._add_priors(diagonal[0], right[0], corner, right_corner)
-        status = arrow_solve.solve_arrow(diagonal, coupling, border, corner, right, right_corner, n, shared)
-        if status != arrow_solve.SOLVED:
+        self._add_priors(arrow)
+        if arrow_solve.solve_arrow(arrow) != arrow_solve.SOLVED:
             return
-        keyframes.poses[:n] += right
-        keyframes.systematic += right_corner[: sheet_graph.SYSTEMATIC]
-        landmarks.lines[: landmarks.count, :2] += right_corner[sheet_graph.SYSTEMATIC :].reshape(-1, 2)
-        cov = arrow_solve.last_block_cov(diagonal[n - 1], border[n - 1], corner, shared)
+        keyframes.poses[:n] += arrow.right
+        keyframes.systematic += arrow.right_corner[: sheet_graph.SYSTEMATIC]
+        lines = arrow.right_corner[sheet_graph.SYSTEMATIC :].reshape(-1, 2)
+        landmarks.lines[: landmarks.count, :2] += lines
+        cov = arrow_solve.last_block_cov(arrow)
         self.cov = 0.5 * (cov + cov.T)[:3, :3]
         half, skew = 0.5 * (self.cov[0, 0] + self.cov[1, 1]), 0.5 * (self.cov[0, 0] - self.cov[1, 1])
         self.position_std_m = math.sqrt(half + math.hypot(skew, self.cov[0, 1]))
 
-    def _add_priors(
-        self, first: FloatArray, right: FloatArray, corner: FloatArray, right_corner: FloatArray
-    ) -> None:
+    def _add_priors(self, arrow: arrow_solve.Arrow) -> None:
         """Add the start, the data sheets, and the places of the sheet's edges."""
+        corner, right_corner = arrow.corner, arrow.right_corner
         config, errors, gyro = self._config, self._config.odometry, self._gyro
         start = np.array(
             [
@@ -244,8 +226,8 @@ class SheetSmoother:
             ]
         )
         weights = start**-2.0
-        first[np.diag_indices(4)] += weights
-        right -= weights * (self.keyframes.poses[0] - self._start)
+        arrow.diagonal[0][np.diag_indices(4)] += weights
+        arrow.right[0] -= weights * (self.keyframes.poses[0] - self._start)
         turn_per_m = errors.radius_difference_std / self._separation
         shared = np.array([gyro.scale_std, errors.turn_scale_std, turn_per_m, errors.distance_scale_std])
         mean = np.array([0.0, 0.0, 0.0, -errors.slip_mean])

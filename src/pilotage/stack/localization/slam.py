@@ -50,8 +50,7 @@ class SlamLocalizer:
         self._odometry = next(iter(robot.sensors_of(WheelOdometryConfig)), None)
         self._config, self._journal = config, journal
         self._slam = OnlineSlam(config)
-        mount = self._scanner.mount
-        self._mount = np.array([mount.x_m, mount.y_m, mount.theta_rad])
+        self._mount = self._scanner.mount.as_array()
         self._unmount = between(self._mount, np.zeros(3))
         self._frame = composed(initial.pose.as_array(), self._mount)
         self._initial_cov = initial.cov

@@ -12,6 +12,7 @@ from pilotage.core.config import Config
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.kernels.lines import joint_association
 from pilotage.kernels.lines.matching import match_lines
+from pilotage.kernels.lines.wall_candidates import MatchRules, SeenLines, Walls
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.maps.wall_lines import WallLines
 from pilotage.sensors.sensor import NonNegative
@@ -79,38 +80,25 @@ class WallMatcher:
     """
 
     def __init__(self, config: WallMatchingConfig, gate: float, world: SegmentMap, mount: FloatArray) -> None:
-        self._config = config
         self.mount = mount
-        self._circles = world.circles_m
         self.walls = WallLines.of(world)
         self.gate = chi_square_quantile(gate, LINE_DOF)
         self.joint_gates = np.array(
             [0.0, *(chi_square_quantile(gate, LINE_DOF * k) for k in range(1, MAX_LINES + 1))]
         )
-        self._margin = chi_square_quantile(config.ambiguity, LINE_DOF)
+        self._known = Walls(self.walls.normals, self.walls.line_of, self.walls.segments_m, world.circles_m)
+        self._rules = MatchRules(
+            self.gate,
+            self.joint_gates,
+            chi_square_quantile(config.ambiguity, LINE_DOF),
+            config.slack_m,
+            config.sigmas,
+            config.overlap,
+            config.options,
+            config.max_nodes,
+        )
 
     def match(self, pose: FloatArray, cov: FloatArray, lines: DetectedLines) -> Matches:
         """Match lines seen from about ``pose`` (3,) with covariance ``cov`` (3, 3); changes neither."""
-        config, walls = self._config, self.walls
-        return Matches(
-            *match_lines(
-                pose,
-                cov,
-                self.mount,
-                lines.rho_alpha,
-                lines.covs,
-                lines.ends_m,
-                walls.normals,
-                walls.line_of,
-                walls.segments_m,
-                self._circles,
-                self.gate,
-                self.joint_gates,
-                self._margin,
-                config.slack_m,
-                config.sigmas,
-                config.overlap,
-                config.options,
-                config.max_nodes,
-            )
-        )
+        seen = SeenLines(self.mount, lines.rho_alpha, lines.covs, lines.ends_m)
+        return Matches(*match_lines(pose, cov, seen, self._known, self._rules))

@@ -55,7 +55,7 @@ class ObstacleLayer:
     def __init__(self, config: ObstacleLayerConfig, robot: RobotKnowledge, chart: WorldMap) -> None:
         self._config = config
         self._lidar, lidar = robot.one_sensor(LidarConfig, "obstacle-layer")
-        self._step = lidar.beam_step_rad
+        self._sheet = lidar
         self._lasers = lasers_of(lidar, robot.sensors)
         self._reach_m = min(config.reach_m, lidar.max_range_m)
         self.unexplained = UnexplainedReturns(lidar, chart, config.tolerance_m, config.sigmas)
@@ -68,7 +68,6 @@ class ObstacleLayer:
         self._origin = (xmin, ymin)
         self._inside_m = INSIDE * robot.footprint.inner_radius_m
         self._passed: IntArray = np.zeros(0, dtype=np.int64)
-        self._range_m = lidar.max_range_m
         self.circles_m: FloatArray = np.zeros((0, 3))
 
     def step(self, readings: Readings, belief: Belief) -> bool:
@@ -109,48 +108,45 @@ class ObstacleLayer:
             scan = readings.by_sensor.get(name)
             if isinstance(scan, LidarScan):
                 at = pose.compose(sheet.mount.pose)
-                looked |= unexpected.seen_through(
-                    self.circles_m,
-                    scan.ranges_m,
-                    at.x_m,
-                    at.y_m,
-                    at.theta_rad + float(sheet.beam_angles_rad()[0]),
-                    sheet.beam_step_rad,
-                    sheet.max_range_m,
-                    self._config.forget_beyond_m,
-                    seen.spread_m,
-                    seen.spread_rad,
-                    sheet.max_range_m,
-                )
+                first_rad = at.theta_rad + float(sheet.beam_angles_rad()[0])
+                ray = (at.x_m, at.y_m, first_rad)
+                looked |= self._seen_through(scan.ranges_m, sheet, ray, sheet.max_range_m, seen)
         return looked
 
     def _forget(self, ranges_m: FloatArray, seen: Unexplained, pose: Pose2, looked: BoolArray) -> None:
         """Take off the map what has been seen through often enough; it may be found there again."""
         config = self._config
+        ray = (seen.x_m, seen.y_m, seen.first_rad)
+        through = self._seen_through(ranges_m, self._sheet, ray, self._reach_m, seen)
+        self._passed = np.where(through & looked, self._passed + 1, 0)
         # Where the robot stands nothing else does: somebody stood there.
-        gone, some = unexpected.gone_discs(
-            self.circles_m,
-            self._passed,
-            looked,
-            ranges_m,
-            seen.x_m,
-            seen.y_m,
-            seen.first_rad,
-            self._step,
-            self._reach_m,
-            config.forget_beyond_m,
-            seen.spread_m,
-            seen.spread_rad,
-            self._range_m,
-            pose.x_m,
-            pose.y_m,
-            self._inside_m,
-            config.forget_scans,
-        )
-        if not some:
+        away_m = np.hypot(self.circles_m[:, 0] - pose.x_m, self.circles_m[:, 1] - pose.y_m)
+        gone = (self._passed >= config.forget_scans) | (away_m < self._inside_m)
+        if not gone.any():
             return
         # A disc lies at the mean of its cell's points, so in its cell.
         columns, rows = ((self.circles_m[gone, :2] - self._origin) / config.cell_m).astype(np.int64).T
         self._hits[rows, columns] = 0
         self._sums[rows, columns] = 0.0
         self.circles_m, self._passed = self.circles_m[~gone], self._passed[~gone]
+
+    def _seen_through(
+        self,
+        ranges_m: FloatArray,
+        lidar: LidarConfig,
+        first_ray: tuple[float, float, float],
+        reach_m: float,
+        seen: Unexplained,
+    ) -> BoolArray:
+        """Which discs (M,) within reach a scan shows not to be there, its first beam's pose told."""
+        return unexpected.seen_through(
+            self.circles_m,
+            ranges_m,
+            *first_ray,
+            lidar.beam_step_rad,
+            reach_m,
+            self._config.forget_beyond_m,
+            seen.spread_m,
+            seen.spread_rad,
+            lidar.max_range_m,
+        )

@@ -11,6 +11,7 @@ from pydantic import Field
 from pilotage.core.config import Config
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.kernels.lines import clustering
+from pilotage.kernels.lines.extraction import LineRules
 from pilotage.kernels.lines.scan_lines import lines_of_scan
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.sensor import NonNegative, Positive
@@ -94,15 +95,22 @@ class LineExtractor:
         rng: np.random.Generator,
     ) -> None:
         self._config = config
-        self._var = range_var_m2
-        self._threshold = config.inlier_sigmas * float(np.sqrt(range_var_m2))
-        self._end_margin = max(config.end_margin_m, self._threshold)
+        threshold_m = config.inlier_sigmas * float(np.sqrt(range_var_m2))
+        self._rules = LineRules(
+            range_var_m2,
+            threshold_m,
+            config.gap_m,
+            max(config.end_margin_m, threshold_m),
+            config.line_points,
+            config.line_length_m,
+            float(scipy.special.ndtri(config.straight)),
+            config.iterations,
+        )
         self._max_range = min(config.max_range_m or lidar.sure_range_m, np.nextafter(lidar.max_range_m, 0.0))
         self._step = lidar.beam_step_rad
         self._directions = clustering.beam_directions(
             float(lidar.beam_angles_rad()[0]), lidar.beam_step_rad, lidar.beams
         )
-        self._straight_z = float(scipy.special.ndtri(config.straight))
         self._rng = rng
 
     def extract(self, ranges_m: FloatArray) -> DetectedLines:
@@ -116,14 +124,7 @@ class LineExtractor:
                 self._max_range,
                 config.cutoff_m,
                 config.cluster_points,
-                self._var,
-                self._threshold,
-                config.gap_m,
-                self._end_margin,
-                config.line_points,
-                config.line_length_m,
-                self._straight_z,
-                config.iterations,
+                self._rules,
                 self._rng.random(UNIFORMS),
                 MAX_LINES,
             )

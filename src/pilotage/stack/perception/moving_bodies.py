@@ -22,14 +22,10 @@ from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.perception.movers import Movers, MoversConfig
 from pilotage.stack.perception.unexplained import UnexplainedReturns
 
-WALKED_M, THROUGH_M = 0.6, 0.25
-"""So far from where it was first seen, which the laser sees through by so much: it walks beyond doubt."""
 VAGUE_M = 0.3
 """Standard deviation of a track's place: what is found in the gate of a vaguer one may be another thing."""
 NEAR_M = 2.0
 """What stands so near for a while is on the map of whoever maps."""
-STRAIGHT = 0.8
-"""Share of its motion by which somebody who comes straight on is nearer."""
 
 
 class MovingBodiesConfig(Config):
@@ -194,9 +190,6 @@ class MovingBodies:
             self.about,
             config.walks_m_s,
             config.tracks.unsure_std_m_s**2,
-            WALKED_M,
-            THROUGH_M,
-            STRAIGHT,
             config.tracks.readings,
             config.stands_readings,
             config.parks_readings,

@@ -97,16 +97,14 @@ class SonarRing:
         watch_below_m: float,
     ) -> float:
         """The return that the map makes one expect; exact where it can make a watched one unexpected."""
-        c, s = math.cos(pose.theta_rad), math.sin(pose.theta_rad)
-        mount = config.mount
-        x, y = pose.x_m + c * mount.x_m - s * mount.y_m, pose.y_m + s * mount.x_m + c * mount.y_m
+        at = pose.compose(config.mount.pose)
         return float(
             rays.cone_range(
-                x,
-                y,
-                pose.theta_rad + mount.theta_rad,
+                at.x_m,
+                at.y_m,
+                pose.theta_rad + config.mount.theta_rad,
                 min(0.5 * config.cone_rad + self._widening_rad, 0.49 * math.pi),
-                walls.near(x, y, watch_below_m + self._tolerance_m),
+                walls.near(at.x_m, at.y_m, watch_below_m + self._tolerance_m),
                 circles_m,
             )
         )

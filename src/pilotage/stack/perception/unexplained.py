@@ -63,16 +63,14 @@ class UnexplainedReturns:
         if self._last is not None and self._asked[0] is scan.ranges_m and self._asked[1] is belief:
             return self._last
         pose, cov, mount, known = belief.pose, belief.cov, self._mount, self._known
-        c, s = math.cos(pose.theta_rad), math.sin(pose.theta_rad)
-        x = pose.x_m + c * mount.x_m - s * mount.y_m
-        y = pose.y_m + s * mount.x_m + c * mount.y_m
+        at = pose.compose(mount.pose)
         first = pose.theta_rad + mount.theta_rad + self._first_rad
         spread_m = self.sigmas * math.sqrt(max(cov[0, 0], cov[1, 1]))
         spread_rad = self.sigmas * math.sqrt(cov[2, 2])
         points, beams = unexplained_points(
             scan.ranges_m,
-            x,
-            y,
+            at.x_m,
+            at.y_m,
             first,
             self._directions,
             self.reach_m,
@@ -83,5 +81,5 @@ class UnexplainedReturns:
             known.resolution_m,
         )
         self._asked = scan.ranges_m, belief
-        self._last = Unexplained(x, y, first, spread_m, spread_rad, points, beams)
+        self._last = Unexplained(at.x_m, at.y_m, first, spread_m, spread_rad, points, beams)
         return self._last

@@ -75,9 +75,7 @@ def shut_for(car: hybrid.Car, clearance_m: float) -> str:
     return f"no path from start to goal is wide enough for the outline: {2.0 * car.inner:.2f} m{to_spare}"
 
 
-def word_states(
-    start: FloatArray, word: FloatArray, turning_m: float, spacing_m: float = STATE_SPACING_M
-) -> FloatArray:
+def word_states(start: FloatArray, word: FloatArray, turning_m: float) -> FloatArray:
     """(N, 3) states along a word from a pose, which is none of them.
 
     Piece by piece: where the curvature or the direction changes there is a state.
@@ -89,7 +87,7 @@ def word_states(
         length = reeds_shepp.word_length(part, turning_m)
         if not length > 0.0:
             continue
-        count = max(1, math.ceil(length / spacing_m))
+        count = max(1, math.ceil(length / STATE_SPACING_M))
         c, s = math.cos(theta), math.sin(theta)
         rows = np.empty((count, 3))
         for i in range(count):

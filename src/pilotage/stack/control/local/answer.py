@@ -10,12 +10,8 @@ from pilotage.kernels.control.motion_limits import Drive
 
 SHARES = (1.15, 1.0, 0.9, 0.8, 0.7, 0.6, 0.5)
 DELAYS = (1.0, 1.25, 1.5, 1.75)
-FORGET = 0.99
-"""Per step: the limits may change with the ground."""
 DOUBT_STD = np.array([0.03, 0.06])
 """Of speed (m/s) and turn rate (rad/s): closer than this no model of the limits need be."""
-MOST_ERROR = 25.0
-"""Of one step, in squared standard deviations: a bump is no limit."""
 PRIOR = 4.0
 """Cost of a hypothesis per unit that it is off the data sheet."""
 KEPT_S = 2.0
@@ -83,7 +79,7 @@ class Answer:
                 self._hypotheses,
                 DOUBT_STD,
             )
-            self._choose(weigh(self._costs, self._prior, errors, FORGET, MOST_ERROR))
+            self._choose(weigh(self._costs, self._prior, errors))
         self._learned_s = t_s
 
     @property

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from pilotage.core.types import STOP, FloatArray, Twist
+from pilotage.core.types import STOP, FloatArray, Pose2, Twist
 from pilotage.kernels.control.band import path_distances
 from pilotage.kernels.control.evasion import best_evasion
 from pilotage.kernels.control.ground import nearest_m
@@ -20,7 +20,6 @@ from pilotage.stack.control.local.command_check import ROUNDING_M, footprint_cle
 from pilotage.stack.control.local.gap_horizon_config import GapHorizonConfig
 from pilotage.stack.control.local.multi_point_turn import MultiPointTurn, find_multi_point_turn
 from pilotage.stack.control.local.narrow_passage import (
-    PASSED_BEHIND_M,
     SLOW_M_S,
     NarrowPassage,
     find_narrow_passage,
@@ -39,8 +38,6 @@ BLIND_M = 0.02
 BACK = -SLOW_M_S, 0.0
 FORESEEN_M = 0.9
 """So far ahead it looks for gaps that leave it hardly any room."""
-LOOKS_PAST_M, LOOKS_ASIDE_M = 2.0, 0.025
-"""Where it is stuck it forgets what the scan looks past so near, and by so little to the side."""
 TRIED_M = 0.3
 """Two narrow places nearer to each other than this are one."""
 TURNS_M_S = 0.1
@@ -254,9 +251,7 @@ class GapHorizon(RollingController):
             return
         self._since = (view.t_s, x, y)
         self._plan = None
-        self._ground.look_past(
-            _scanned(view, scene), _laser_xy_m(view, scene), LOOKS_PAST_M, LOOKS_ASIDE_M, PASSED_BEHIND_M
-        )
+        self._ground.look_past(_scanned(view, scene), _laser_xy_m(view, scene))
         if self._passage is not None:
             moved = self._moved_s > self._passage.begun_s
             self._passage, self._moved_s = self._passage.again(view.t_s) if moved else None, view.t_s
@@ -350,9 +345,8 @@ class GapHorizon(RollingController):
 
 
 def _laser_xy_m(view: LocalView, scene: Scene) -> tuple[float, float]:
-    x, y, theta = (float(value) for value in scene.pose)
-    c, s = math.cos(theta), math.sin(theta)
-    return x + c * view.mount.x_m - s * view.mount.y_m, y + s * view.mount.x_m + c * view.mount.y_m
+    at = Pose2.from_array(scene.pose).compose(view.mount)
+    return at.x_m, at.y_m
 
 
 def _scanned(view: LocalView, scene: Scene) -> FloatArray:
@@ -363,6 +357,4 @@ def _scanned(view: LocalView, scene: Scene) -> FloatArray:
     in_base, _ = scan_points(
         mount.x_m, mount.y_m, mount.theta_rad, ranges, float(angles[0]), step, view.max_range_m
     )
-    x, y, theta = scene.pose
-    c, s = math.cos(theta), math.sin(theta)
-    return np.asarray([x, y] + in_base @ np.array([[c, s], [-s, c]]))
+    return Pose2.from_array(scene.pose).placed(in_base)

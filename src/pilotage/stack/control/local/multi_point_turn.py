@@ -13,8 +13,6 @@ from pilotage.kernels.geometry.motion import wrap
 from pilotage.stack.control.local.rolling import Scene
 from pilotage.stack.control.local.turning_room import lacks_room_to_turn, point_of_the_way
 
-OFF_RAD = 0.35
-"""Headed for its way within this it plans again."""
 SLOW_M_S, TURN_RAD_S = 0.1, 0.6
 """Millimetres from walls that its laser shows to a few of them."""
 NEAR_M, STRAIGHT_RAD, AT_REST_RAD_S = 0.004, 0.02, 0.1
@@ -81,7 +79,6 @@ def find_multi_point_turn(
             scene.start[:3],
             float(point[0]),
             float(point[1]),
-            OFF_RAD,
             scene.body,
             scene.ground,
             margin_m,

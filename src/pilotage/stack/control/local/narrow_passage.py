@@ -20,7 +20,7 @@ from pilotage.stack.control.local.gap_strip import (
     sides_begin_m,
     widest_strip,
 )
-from pilotage.stack.control.local.rolling import Scene
+from pilotage.stack.control.local.rolling import PASSED_BEHIND_M, Scene
 
 BEFORE_M = 0.6
 BEYOND_M = 0.35
@@ -67,7 +67,6 @@ NOISE_M = 0.03
 """Points of neighbouring cells so near to each other are one surface, and its noise."""
 PASSED_WITHIN_M = 1.2
 PASSED_ASIDE_M = 0.015
-PASSED_BEHIND_M = 0.04
 """What a scan from so near looks past by so little to the side, and ends so far behind, is not there."""
 NEW_SHARE = 0.15
 """Weight of a new scan in where these ends are."""

@@ -23,6 +23,8 @@ from pilotage.stack.control.local.rolling_config import PEOPLE_FADE_HITS, Rollin
 from pilotage.stack.control.local.time_to_go import TimeToGo
 from pilotage.stack.perception.movers import Movers
 
+LOOKS_PAST_M, LOOKS_ASIDE_M, PASSED_BEHIND_M = 2.0, 0.025, 0.04
+"""What the scan looks past so near and by so little to the side, and ends so far behind, is not there."""
 INSIDE_M = 0.05
 """A point so deep inside the footprint is a mistake. Where people walk any inside is somebody who brushed
 past: behind the robot, where its laser does not look, it would shut the robot in for ever."""
@@ -170,24 +172,18 @@ class RollingGround:
             self._mark_first(body, float(angles[-1] - angles[0]) < math.pi - 1e-6)
         config, mount = self._config, view.mount
         ground_update.insert_scan(
-            self._hits,
-            self._mean,
-            self._seen,
+            ground_update.Grids(self._hits, self._mean, self._seen, *self._corner_m, self._cell_m),
+            ground_update.Fan(
+                ranges, first, step, view.max_range_m, self._take_sectors(angles.shape[0], step)
+            ),
             self._pose,
             mount.as_array(),
-            ranges,
-            self._take_sectors(angles.shape[0], step),
-            first,
-            step,
-            view.max_range_m,
             config.reach_m,
             dense_m(body.inner_m, step),
             still,
             body.polygon,
             0.0 if self._tracks else INSIDE_M,
             max(config.fade_hits, PEOPLE_FADE_HITS) if view.people_about else config.fade_hits,
-            *self._corner_m,
-            self._cell_m,
         )
         ground = self._ground(body, drive, rolled, avoid)
         self._answer.learn(
@@ -358,14 +354,10 @@ class RollingGround:
         """Forget what was closed: a way through it may be better than none."""
         self._togo.open_all()
 
-    def look_past(
-        self, points_xy_m: FloatArray, laser_xy_m: tuple[float, float], reach_m: float, aside_m: float,
-        behind_m: float,
-    ) -> None:  # fmt: skip
+    def look_past(self, points_xy_m: FloatArray, laser_xy_m: tuple[float, float]) -> None:
         """Forget what a scan with its ends at points (N, 2) looks past from nearby: ``without_passed``."""
-        self._hits[:] = without_passed(
-            self._hits, self._mean, points_xy_m, *laser_xy_m, reach_m, aside_m, behind_m
-        )
+        limits_m = LOOKS_PAST_M, LOOKS_ASIDE_M, PASSED_BEHIND_M
+        self._hits[:] = without_passed(self._hits, self._mean, points_xy_m, *laser_xy_m, *limits_m)
 
     def time_to_go_beside(self, discs: FloatArray, scene: Scene) -> FloatArray:
         """Time to go (m, m) where discs (N, 3), x, y, radius in the map frame, are closed as well."""

@@ -12,18 +12,9 @@ from pilotage.kernels.slam.seen_again import passes_near
 from pilotage.stack.mapping.slam.clouds import Clouds
 from pilotage.stack.mapping.slam.uncertainty import Edges, edge_information, relative_poses
 
-RADIUS_M = 2.5
-MOST_TURN_RAD = 1.6
-TURN_AS_DISTANCE_M = 0.6
-NEIGHBOURS = 8
-APART = 6
-"""Keyframes between two neighbours of the same one: as many different passes as possible."""
 ALONG = (1, 2, 4)
 """Keyframes ahead that each one is aligned with along the path."""
-LEAST_BEHIND = 12
-SPREAD = 2
 PRIOR = np.diag([0.5, 0.5, 5.0])
-REACH_M, LAST_REACH_M, SCALE_M = 0.3, 0.12, 0.03
 LEAST_PAIRED = 0.4
 MOST_MOVED_M, MOST_MOVED_RAD = 0.35, 0.12
 PAIR_STD_M = 0.05
@@ -37,16 +28,7 @@ def neighbours(poses: FloatArray, since: int = 0) -> IntArray:
     With ``since`` they are pairs of one before it with one from it on alone.
     """
     count = poses.shape[0]
-    again = passes_near(
-        poses,
-        since,
-        LEAST_BEHIND,
-        RADIUS_M,
-        MOST_TURN_RAD,
-        TURN_AS_DISTANCE_M,
-        APART,
-        NEIGHBOURS,
-    )
+    again = passes_near(poses, since)
     along = [np.arange(count - ahead)[:, None] + [0, ahead] for ahead in ALONG if ahead < count and not since]
     pairs = np.concatenate([*along, again])
     return np.asarray(pairs[np.lexsort(pairs.T[::-1])])
@@ -54,17 +36,7 @@ def neighbours(poses: FloatArray, since: int = 0) -> IntArray:
 
 def pair_edges(clouds: Clouds, poses: FloatArray, pairs: IntArray) -> Edges:
     """Align pairs (M, 2) of keyframes from where the poses have them; those that do not fit are left out."""
-    relative, hessian, fit, status = align_pairs(
-        clouds.points,
-        clouds.starts,
-        poses,
-        pairs,
-        SPREAD,
-        REACH_M,
-        LAST_REACH_M,
-        SCALE_M,
-        PRIOR,
-    )
+    relative, hessian, fit, status = align_pairs(clouds.points, clouds.starts, poses, pairs, PRIOR)
     relative[:, 2] = (relative[:, 2] + np.pi) % (2.0 * np.pi) - np.pi
     moved = relative_poses(relative_poses(poses[pairs[:, 0]], poses[pairs[:, 1]]), relative)
     sound = (

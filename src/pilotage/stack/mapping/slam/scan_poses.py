@@ -8,11 +8,11 @@ from pilotage.core.types import FloatArray
 from pilotage.kernels.slam.align import TOO_FEW, align
 from pilotage.kernels.slam.buckets import sort_into_buckets
 from pilotage.kernels.slam.frames import between, composed, gathered
+from pilotage.kernels.slam.pairs import LAST_REACH_M, SCALE_M
 from pilotage.kernels.slam.slips import told_by
 from pilotage.logs.laser_log import LaserLog
 from pilotage.stack.mapping.slam.clouds import Clouds, cloud_of
 from pilotage.stack.mapping.slam.config import SlamConfig
-from pilotage.stack.mapping.slam.refinement import LAST_REACH_M, SCALE_M
 from pilotage.stack.mapping.slam.tracker import LocalTrack
 from pilotage.stack.mapping.slam.uncertainty import TRACK_STD_M, relative_poses
 

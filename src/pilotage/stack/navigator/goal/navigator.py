@@ -11,15 +11,16 @@ from pilotage.sensors.readings import Readings
 from pilotage.stack.interface import NAVIGATORS, Belief, BeliefStatus, StackStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
+from pilotage.stack.mapping.mapper import Mapper
 from pilotage.stack.navigator.global_plan import GlobalPlan
 from pilotage.stack.navigator.goal.context import Context
 from pilotage.stack.navigator.goal.ended import Ended
 from pilotage.stack.navigator.goal.finding import Lost, first_state, lose
-from pilotage.stack.navigator.goal.mates_unseen import MatesUnseen
 from pilotage.stack.navigator.goal.state import State
 from pilotage.stack.navigator.goal_config import GoalNavigatorConfig
 from pilotage.stack.navigator.navigator import Parts, check_for_centre, localizer_of
 from pilotage.stack.navigator.own_map import OwnMap
+from pilotage.stack.perception.moving_bodies import MovingBodies
 
 COLUMNS = {
     "ref_x_m": "m",
@@ -127,3 +128,41 @@ class GoalNavigator:
             context.mode,
             context.to_go_m,
         )
+
+
+SCANS = 15
+"""Whoever maps has added something after so many of what stands near."""
+
+
+class MatesUnseen:
+    """Says so once: at the start without a mapper, else where one puts nothing of what stands on the map.
+
+    One from outside may map whatever it likes: only what it has not mapped tells of it.
+
+    Parameters
+    ----------
+    mates
+        How many others drive about.
+    """
+
+    def __init__(self, mates: int, mapper: Mapper | None, bodies: MovingBodies, journal: Journal) -> None:
+        self._others = "another robot drives about" if mates == 1 else f"{mates} others drive about"
+        self._mapper, self._bodies, self._journal = mapper, bodies, journal
+        self._to_say = mates > 0
+        if mapper is None:
+            self._say(0.0, "without stack.mapper it goes around nobody")
+
+    def look(self, t_s: float) -> None:
+        """Compare what stands near the robot with what the mapper has added, after a step."""
+        if not self._to_say or self._mapper is None or self._bodies.shown_scans < SCANS:
+            return
+        if not len(self._mapper.circles_m):
+            what = f"what stands {self._bodies.shown_m:.2f} m away"
+            self._say(
+                t_s, f"stack.mapper puts nothing on the map of {what}: it goes around nobody who stands"
+            )
+
+    def _say(self, t_s: float, why: str) -> None:
+        if self._to_say:
+            self._journal.say(t_s, "mates-unseen", f"{self._others}, and {why}")
+            self._to_say = False
