@@ -143,6 +143,7 @@ def test_text_is_utf8_without_zeros(tmp_path: Path) -> None:
         ("!!python/object:os.system x", "the tag '!!python/object:os.system', which"),
         ("a: \x1b[31m", "control characters are not allowed"),
         ("{[1, 2]: 3}", "unhashable key"),
+        ("a: 1\n\tb: 2\n", "line 2: expected YAML, found: a tab where YAML takes spaces"),
     ],
 )
 def test_yaml_that_hangs_or_swells_is_refused(text: str, message: str) -> None:

@@ -47,6 +47,8 @@ def load_yaml(text: str, where: str) -> Any:
         # The C parser counts one line more at the end of the text.
         line = f" line {min(mark.line, text.count(chr(10))) + 1}" if mark is not None else ""
         problem = getattr(error, "problem", None) or str(error) or "not YAML"
+        if mark is not None and text[mark.index : mark.index + 1] == "\t":
+            problem = "a tab where YAML takes spaces"
         problem = _UNKNOWN_TAG.sub(r"the tag '!!\1', which has no meaning here", problem)
         raise InputError(f"{where}{line}: expected YAML, found: {problem}") from None
     except (ValueError, OverflowError) as error:  # a date that is none
