@@ -17,6 +17,7 @@ from pilotage.evaluation.metrics import METRICS
 from pilotage.experiments.given import has
 from pilotage.experiments.mission import load_mission, shipped_missions
 from pilotage.experiments.run import run_mission
+from pilotage.experiments.studies import attribution
 from pilotage.experiments.studies.attribution import attribution_of, attribution_study, is_attribution
 from pilotage.experiments.studies.engine import check_asked, run_study
 from pilotage.experiments.studies.options import StudyOptions
@@ -128,6 +129,16 @@ def test_terrain_from_the_command_line(
     text = capsys.readouterr().out
     assert "planned_length_m" not in text
     assert "What costs most is 'planner': with an oracle for it" in text
+
+
+def test_a_strangers_task_is_attributed_by_what_its_runs_give(monkeypatch: pytest.MonkeyPatch) -> None:
+    """All that any task may give was asked for, and the study refused after its last trial."""
+    monkeypatch.setattr(attribution, "is_from_outside", lambda _: True)
+    definition = attribution_study("museum-1", (), 2).definition
+    assert (definition.metrics, definition.primary) == ((), None)
+    judging = METRICS.costs_of("somebodys", METRICS.given_by("reach"))
+    assert "position_rmse_m" in {metric.key for metric in judging}
+    assert not any(METRICS.is_wall_clock(metric.key) for metric in judging)
 
 
 def test_another_study_has_no_ranking(planned: Path) -> None:

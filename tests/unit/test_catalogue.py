@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from enum import Enum
+from typing import Literal
+
 import pytest
 
+from pilotage.core.config import Config
 from pilotage.core.errors import InputError
-from pilotage.experiments.catalogue import components, roles
+from pilotage.experiments.catalogue import _parameters, components, roles
 from pilotage.experiments.mission import mission_of
 from pilotage.experiments.roles import ROLES
 
@@ -49,3 +53,26 @@ def test_a_missing_part_says_what_lists_it(
             {**BARE, "stack": stack, "robot": {"footprint": {"radius_m": 0.3}, **robot}, "task": "plan"}
         )
     assert str(refused.value).startswith(told)
+
+
+def test_a_parameters_default_is_told_as_a_mission_says_it() -> None:
+    """An enumeration told its class twice, and ``none`` is a text where a number is asked for."""
+
+    class Shape(Enum):
+        ROUND = "round"
+        SQUARE = "square"
+
+    class Several(Config):
+        shape: Shape = Shape.ROUND
+        at_m: tuple[float, float] = (0.5, 1.0)
+        often: bool = False
+        many: int | Literal["auto"] = "auto"
+        most_m: float | None = None
+
+    assert _parameters(Several) == [
+        ("shape", "round", "round | square"),
+        ("at_m", "[0.5, 1.0]", "array"),
+        ("often", "false", "boolean"),
+        ("many", "auto", "integer or auto"),
+        ("most_m", "null", "number or null"),
+    ]

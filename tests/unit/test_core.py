@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from pydantic import Field, model_validator
 from pilotage.core.angles import is_in_view, wrap_array_to_pi, wrap_to_pi
 from pilotage.core.config import Config, validate
 from pilotage.core.errors import InputError, nearest, unknown_name
+from pilotage.core.parameters import unfit_parameters
 from pilotage.core.random import RandomStreams
 from pilotage.core.registry import Registry
 from pilotage.core.types import Pose2
@@ -260,6 +262,41 @@ def test_a_wrong_type_says_what_was_expected_and_found(values: object, begins: s
     assert str(raised.value).startswith(begins)
     assert str(raised.value).endswith(ends)
     assert len(str(raised.value)) < 250
+
+
+class Several(Config):
+    """Values that may be of several kinds."""
+
+    many: int | Literal["auto"] = "auto"
+    limit: float | tuple[float, float] | None = None
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"many": "aut"}, "it.many: input should be a valid integer or 'auto', found 'aut'"),
+        ({"many": 1.5}, "it.many: input should be a valid integer or 'auto', found 1.5"),
+        ({"many": None}, "it.many: input should be a valid integer or 'auto', found nothing"),
+        ({"limit": "x"}, "it.limit: input should be a valid number or a list, found 'x'"),
+    ],
+)
+def test_a_value_of_several_kinds_is_refused_at_its_key(values: object, message: str) -> None:
+    """It was told at a key ``many.int``, of the first kind alone."""
+    with pytest.raises(InputError) as raised:
+        validate(Several, values, "it")
+    assert str(raised.value) == message
+
+
+def test_a_parameters_type_may_stand_below_it_and_has_to_stand_somewhere() -> None:
+    """Whoever asked what there is read a traceback and that it was a bug in pilotage."""
+
+    class Early(Config):
+        inner: Nowhere | None = None  # type: ignore[name-defined]  # noqa: F821
+
+    assert unfit_parameters(Early, complete=False) == ""
+    assert unfit_parameters(Early, complete=True) == (
+        "types that are defined in its file, found 'Nowhere', which is not"
+    )
 
 
 def test_without_a_place_the_key_stands_alone() -> None:

@@ -143,6 +143,7 @@ def test_text_is_utf8_without_zeros(tmp_path: Path) -> None:
         ("!!python/object:os.system x", "the tag '!!python/object:os.system', which"),
         ("a: \x1b[31m", "control characters are not allowed"),
         ("{[1, 2]: 3}", "unhashable key"),
+        ("a: 1\n\tb: 2\n", "line 2: expected YAML, found: a tab where YAML takes spaces"),
     ],
 )
 def test_yaml_that_hangs_or_swells_is_refused(text: str, message: str) -> None:
@@ -155,8 +156,17 @@ def test_yaml_counts_in_tens() -> None:
     assert load_yaml("[1:30:00, 3:10:20.5, 12]", "") == ["1:30:00", "3:10:20.5", 12]
 
 
+def test_yaml_takes_on_and_no_for_words() -> None:
+    """A parameter ``on`` was refused as an unknown key 'true', a text ``off`` as no text."""
+    text = "{on: no, null: y, ~: ~, 2026-11-28: off, true: TRUE, 7: !!bool yes}"
+    values: dict[object, object] = {"on": "no", "null": "y", "~": None, "2026-11-28": "off", "true": True}
+    assert load_yaml(text, "") == {**values, 7: True}
+    with pytest.raises(InputError, match="the key 'on' twice"):
+        load_yaml("{on: 1, 'on': 2}", "file")
+
+
 def test_yaml_says_what_it_said() -> None:
-    text = "a: &a {x: 1, y: [1.5, ~, yes]}\nb: {<<: *a, x: 2}\nc: *a\n? d\n: |\n  long\n  text\n"
+    text = "a: &a {x: 1, y: [1.5, ~, true]}\nb: {<<: *a, x: 2}\nc: *a\n? d\n: |\n  long\n  text\n"
     y = [1.5, None, True]
     assert load_yaml(text, "file") == {
         "a": {"x": 1, "y": y},

@@ -268,16 +268,21 @@ class TestRosMaps:
             )
             assert RosMap(file, pixels).grid.cells.tolist() == [cells]
 
-    def test_what_is_not_opaque_is_unknown_in_scale(self) -> None:
-        file = RosMapFile(image="a.png", mode="scale", resolution=1.0, origin=(0, 0, 0))
+    @pytest.mark.parametrize("mode", ["trinary", "scale"])
+    def test_what_is_not_opaque_is_unknown(self, mode: Any) -> None:
+        """As Navigation 2 has it now: transparent black was a wall, an opaque grey of 205 free."""
+        file = RosMapFile(image="a.png", mode=mode, resolution=1.0, origin=(0, 0, 0))
         pixels, alpha = np.array([[255, 255, 0]], np.uint8), np.array([[255, 254, 0]], np.uint8)
         assert RosMap(file, pixels, alpha).grid.cells.tolist() == [[0, -1, -1]]
 
     @pytest.mark.parametrize(
         ("change", "match"),
         [
-            ({"image": "missing.pgm"}, "missing.pgm', found none$"),
-            ({"image": "/on/the/robot/a.pgm"}, "found none; take 'image: a.pgm', which lies beside it$"),
+            ({"image": "missing.pgm"}, "missing.pgm', or one of its name beside it, found none; beside"),
+            ({"image": "/on/the/robot/ab.pgm"}, "found none; did you mean '.*/a.pgm'"),
+            ({"occupied_threshold": 0.6, "occupied_thresh": None}, "occupied_thresh"),
+            ({"free_threshold": 0.2}, "free_threshold: unknown key; did you mean 'free_thresh'"),
+            ({"Mode": "raw"}, "Mode: unknown key; did you mean 'mode'"),
             ({"resolution": 0.0}, "resolution"),
             ({"resolution": math.nan}, "resolution"),
             ({"origin": [0.0]}, "origin"),
@@ -295,6 +300,38 @@ class TestRosMaps:
         (tmp_path / "map.yaml").write_text("image: [")
         with pytest.raises(InputError, match="YAML"):
             read_grid(tmp_path / "map.yaml")
+
+    @pytest.mark.parametrize(
+        "change",
+        [
+            {"name": "hall", "map_type": "occupancy", "frame_id": "map", "layers": [{"image": "b.pgm"}]},
+            {"image": "/on/the/robot/a.pgm"},
+            {"image": "C:\\maps\\a.pgm"},
+            {"image": "package://hall/maps/a.pgm"},
+            {"mode": "Trinary"},
+            {"origin": [0, 0]},
+        ],
+    )
+    def test_what_others_maps_have_besides_is_none_of_its_business(
+        self, tmp_path: Path, change: dict[str, Any]
+    ) -> None:
+        """`name` was refused as a misspelt `mode`, and a path on the robot that made the map as missing."""
+        write_grey(tmp_path / "a.pgm", np.array([[0, 254], [205, 254]], np.uint8))
+        values = {"image": "a.pgm", "resolution": 0.05, "origin": [0, 0, 0], "negate": 0}
+        text = yaml.safe_dump(values | change)
+        for written in (
+            text,
+            text.replace("\n", "\r\n"),
+            "\ufeff" + text,
+            text.replace("negate: 0", "negate:\t0"),
+        ):
+            (tmp_path / "map.YAML").write_bytes(written.encode())
+            assert read_grid(tmp_path / "map.YAML").cells.tolist() == [[OCCUPIED, FREE], [UNKNOWN, FREE]]
+
+    @pytest.mark.parametrize("negate", [1, 2, True, "yes"])
+    def test_a_negated_map_is_one_however_it_says_so(self, negate: Any) -> None:
+        values = {"image": "a.pgm", "resolution": 0.05, "origin": [0, 0, 0], "negate": negate}
+        assert RosMapFile.model_validate(values).negate
 
 
 MAP = "type octile\nheight 2\nwidth 4\nmap\n.GS@\nTOW.\n"

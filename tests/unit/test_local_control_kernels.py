@@ -23,7 +23,7 @@ from pilotage.kernels.control.match import match_scan
 from pilotage.kernels.control.merged_means import merged_means, without_passed
 from pilotage.kernels.control.motion_limits import Drive, advance, approach, command_is_safe
 from pilotage.kernels.control.rollouts import weighted_mean
-from pilotage.kernels.control.scan_ends import evenly_spaced
+from pilotage.kernels.control.scan_ends import cleaned_ranges, evenly_spaced
 from pilotage.kernels.control.togo import UNREACHED_S, descent_path, time_to_go
 from pilotage.kernels.geometry.motion import exact_arc
 from pilotage.kernels.grids.distance import nearest_marked
@@ -34,6 +34,21 @@ from support.seen_ground import DRIVE, JACKAL, ground_of
 NOBODY = np.zeros((1, 0, 3))
 SPEED = st.floats(-0.5, 2.0)
 TURN = st.floats(-4.0, 4.0)
+
+
+@pytest.mark.parametrize(
+    ("told", "ranges", "silent"),
+    [
+        ([1.0, math.nan, math.inf, 0.0, 7.0], [1.0, 0.0, 5.0, 0.0, 7.0], 1),
+        ([math.nan, math.nan], [0.0, 0.0], 2),
+    ],
+)
+def test_a_beam_that_measured_nothing_passed_through_nothing(
+    told: list[float], ranges: list[float], silent: int
+) -> None:
+    """The ground along it counted as seen, and free."""
+    cleaned, found = cleaned_ranges(np.array(told), 5.0)
+    assert (cleaned.tolist(), found) == (ranges, silent)
 
 
 @pytest.mark.parametrize(("rows", "columns"), [(0, 3), (2, -1), (-5, 4), (9, 0)])

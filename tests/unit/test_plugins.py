@@ -106,6 +106,21 @@ PLANNERS.add({name}, {config})({what})
 NAMED = REGISTERS.format(name="'mine'", config="Mine", what="Planner").replace(
     '"Nothing."', "name: str = 'x'", 1
 )
+PARAMETERS = """
+from __future__ import annotations
+import numpy as np
+from pydantic import Field
+from pilotage.core.config import Config
+from pilotage.stack.planning.planner import PLANNERS
+class Mine(Config):
+    {parameter}
+@PLANNERS.add("mine", Mine)
+class Planner:
+    "Mine."
+    clearance_m = 0.3
+    def plan(self, request):
+        "Nothing."
+"""
 MUTE = "class Mute(Exception):\n    def __str__(self):\n        return 1 / 0\n"
 TAKEN_METRIC = """
 from pilotage.evaluation.metric import Metric
@@ -139,6 +154,19 @@ METRICS.add(Metric("duration_s", "mine", "s", ""))
         (
             NAMED.format(name="'mine'", config="Mine", what="Planner"),
             "planner 'mine': expected parameters of any other name, found 'name'",
+        ),
+        (
+            PARAMETERS.format(parameter="weights: np.ndarray = None"),
+            "planner 'mine': expected parameters that a file can hold (numbers, texts, true or false, lists, "
+            "mappings, other configs), found 'weights', which is of ndarray",
+        ),
+        (
+            PARAMETERS.format(parameter="decay: float = Field(0.5, alias='lambda')"),
+            "expected parameters named in files as in the class, found 'decay' with the alias 'lambda'",
+        ),
+        (
+            PARAMETERS.format(parameter="gain: float = float('inf')"),
+            "expected defaults that it takes itself: gain: input should be a finite number, found inf",
         ),
         (TAKEN, "planner 'astar': expected a new name, found it registered already"),
         (TAKEN_METRIC, "metric 'duration_s': expected a new key, found it declared already"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -23,6 +24,9 @@ from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.segment_map import SegmentMap, box_segments
 from pilotage.missions.places import PoseConfig
 from pilotage.models.odometry import OdometryModel
+from pilotage.sensors.lidar import LidarConfig
+from pilotage.sensors.readings import LidarScan, Readings
+from pilotage.sensors.sensor import Mount
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 from pilotage.stack.control.wander import WanderConfig, Wanderer
 from pilotage.stack.interface import Belief, BeliefStatus
@@ -184,6 +188,26 @@ def test_a_lane_is_as_long_as_the_floor_is_free() -> None:
     points = np.array([[2.0, 0.1], [1.0, 0.5], [-1.0, 0.0]])
     lengths = wander.free_lengths(points, np.array([0.0, math.pi / 2, math.pi]), 0.4, 5.0)
     assert lengths == pytest.approx([2.0, 5.0, 1.0])
+
+
+@pytest.mark.parametrize(
+    ("turned_rad", "unmeasured", "ahead"),
+    [
+        (0.0, slice(0), True),
+        (0.0, slice(0, None, 7), True),
+        (0.0, slice(60, 121), False),
+        (3.1, slice(0), False),
+    ],
+)
+def test_a_lane_that_nobody_measured_is_none(turned_rad: float, unmeasured: slice, ahead: bool) -> None:
+    """One beam without a measurement was a wall before the scanner, or none; behind a laser all was free."""
+    lidar = LidarConfig(beams=181, field_of_view_rad=math.pi, mount=Mount(x_m=0.2, theta_rad=turned_rad))
+    wanderer = Wanderer.of(WanderConfig(), replace(told_of().robot, sensors={"lidar": lidar}))
+    assert wanderer is not None
+    ranges_m = np.full(181, 10.0)
+    ranges_m[unmeasured] = math.nan
+    command = wanderer.step(Readings(0.0, {"lidar": LidarScan(ranges_m)}))
+    assert (command.v_m_s > 0.0) is ahead
 
 
 @pytest.mark.parametrize("bearing", [None, 0.0, 2.0, -3.0])

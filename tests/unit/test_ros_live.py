@@ -147,7 +147,7 @@ def test_scans_of_other_beams_are_taken_by_the_nearest() -> None:
     sheet = LidarConfig(beams=21, field_of_view_rad=2.0, max_range_m=150.0)
     assert _ranges(message, sheet).tolist() == [min(1.0 + 10.0 * k, 150.0) for k in range(21)]
     wide = LidarConfig(beams=3, field_of_view_rad=4.0, max_range_m=150.0)
-    assert _ranges(message, wide).tolist() == [150.0, 101.0, 150.0]
+    assert _ranges(message, wide).tolist() == pytest.approx([math.nan, 101.0, math.nan], nan_ok=True)
 
 
 @pytest.mark.parametrize(("first_rad", "step_deg"), [(0.0, 1.0), (2.0 * math.pi, -1.0), (-math.pi, 1.0)])
@@ -162,10 +162,13 @@ def test_a_scanner_that_looks_all_around_may_begin_anywhere(first_rad: float, st
 
 
 def test_what_a_driver_says_of_beams_without_a_range_is_understood() -> None:
-    """A wall too near to be measured read as nothing there, and a zero for no return as a wall."""
+    """A wall too near to be measured read as nothing there, and what was not measured at all, too."""
     sheet = LidarConfig(beams=7, field_of_view_rad=0.6, max_range_m=5.0)
     message = _scan(-0.3, 0.1, [-math.inf, 0.0, 0.05, 3.0, 9.0, math.inf, math.nan])
-    assert _ranges(message, sheet).tolist() == [0.1, 5.0, 0.1, 3.0, 5.0, 5.0, 5.0]
+    read = [0.1, math.nan, 0.1, 3.0, 5.0, 5.0, math.nan]
+    assert _ranges(message, sheet).tolist() == pytest.approx(read, nan_ok=True)
+    far = sheet.model_copy(update={"max_range_m": 20.0})  # that nothing is there the scanner says up to 8 m
+    assert _ranges(message, far).tolist() == pytest.approx([*read[:4], *[math.nan] * 3], nan_ok=True)
     unset = _scan(-0.3, 0.1, [3.0] * 7, range_max=0.0)
     assert _ranges(unset, sheet).tolist() == [3.0] * 7
 

@@ -16,6 +16,7 @@ from pilotage.evaluation.metrics import METRICS
 from pilotage.experiments.studies.database import DATABASE
 from pilotage.experiments.studies.definition import StudyDefinition
 from pilotage.experiments.studies.engine import _write
+from pilotage.experiments.studies.files import digests
 from pilotage.experiments.studies.rows import read_rows
 from pilotage.experiments.studies.store import Store
 from pilotage.experiments.studies.study import (
@@ -42,6 +43,17 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
     assert not line.startswith("pilotage: :")
     assert len(line) < 700
     return line
+
+
+@pytest.mark.parametrize("named", ["a.pgm", "/on/the/robot/a.pgm"])
+def test_a_maps_image_decides_rows_wherever_it_is_found(tmp_path: Path, named: str) -> None:
+    """Of a map whose name ends in capitals, or that was moved with its image, another image passed for it."""
+    (tmp_path / "a.pgm").write_bytes(b"P5 1 1 255 x")
+    (tmp_path / "map.YAML").write_text(f"image: {named}\nresolution: 1\norigin: [0, 0]\n")
+    before = digests({"map": str(tmp_path / "map.YAML")})
+    (tmp_path / "a.pgm").write_bytes(b"P5 1 1 255 y")
+    after = digests({"map": str(tmp_path / "map.YAML")})
+    assert {Path(path).name for path in before if before[path] != after[path]} == {"a.pgm"}
 
 
 @pytest.mark.parametrize(

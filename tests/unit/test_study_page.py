@@ -372,6 +372,21 @@ def test_configurations_are_drawn_over_what_their_settings_amount_to() -> None:
     assert 'id="settings"' not in page
 
 
+def test_a_line_over_a_factor_may_have_lists_and_mappings_beside_it() -> None:
+    """A study over a parameter that is a list ended in a traceback after its last trial, with no page."""
+    beside = ([1, 2], [2, 3], {"gain": 1.0}, None)
+    pairs = [(gate, other) for gate in (0.9, 0.99) for other in beside]
+    cells = [
+        cell_of(i, f"{gate}, {other}", {"gate": gate, "pair": other}, {})
+        for i, (gate, other) in enumerate(pairs)
+    ]
+    view = made_up(cells, ("position_rmse_m",), lambda c, t, _: 1.0 + c.index + 0.1 * t, None)
+    lines = lines_over(view, view.cells, "gate")
+    assert sorted(name for name, _ in lines) == sorted(map(str, beside))
+    assert all(len(line) == 2 for _, line in lines)
+    study_page(view)
+
+
 def test_nothing_finished_yet_is_said() -> None:
     view = two_settings(0.0)
     empty = replace(

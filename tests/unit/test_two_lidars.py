@@ -116,6 +116,25 @@ def test_where_no_laser_looks_nothing_is_told() -> None:
     assert not np.isnan(ranges_m[np.abs(looks) < 0.95]).any()
 
 
+@pytest.mark.parametrize("lasers", [2, 3, 4])
+@pytest.mark.parametrize("short_rad", [0.0, 1.6e-3, 2.65e-6, 1e-12, -1e-12, -1e-5, -0.1])
+@pytest.mark.parametrize("turned_rad", [0.0, 0.3, -2.0])
+def test_views_that_meet_go_all_around(lasers: int, short_rad: float, turned_rad: float) -> None:
+    """Of two half circles, each of 3.14159 rad, the one in front was not among the beams of both."""
+    view_rad = 2.0 * math.pi / lasers - short_rad
+    corners: dict[str, SensorConfig] = {
+        f"laser{k}": LidarConfig(
+            beams=180,
+            field_of_view_rad=view_rad,
+            mount=Mount(x_m=0.1 * k, theta_rad=turned_rad + 2.0 * math.pi * k / lasers),
+        )
+        for k in range(lasers)
+    }
+    sheet = joint_lidar(corners)
+    assert sheet is not None
+    assert sheet.field_of_view_rad == 2.0 * math.pi
+
+
 def test_two_lasers_that_look_ahead_do_not_see_what_is_behind() -> None:
     ahead: dict[str, SensorConfig] = {
         "left": LidarConfig(field_of_view_rad=2.0, mount=Mount(y_m=0.2, theta_rad=0.4)),

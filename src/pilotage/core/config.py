@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping
-from typing import Any, Self, TypeAlias, TypeVar, get_origin
+from collections.abc import Callable, Mapping, Sequence
+from types import NoneType, UnionType
+from typing import Any, Self, TypeAlias, TypeVar, Union, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
@@ -64,6 +65,7 @@ SMALLEST, LARGEST, LARGEST_WHOLE = 1e-100, 1e15, 2**63 - 1
 
 _DEEPEST = 4
 """Levels of a file in which a key is looked for that stands at the wrong place."""
+_SHOULD = "Input should be "
 _LISTS = (list, tuple, dict)
 
 ConfigT = TypeVar("ConfigT", bound=BaseModel)
@@ -123,8 +125,11 @@ def describe(
     # An unknown key is the likelier slip and explains a missing one: say it first.
     first = next((e for e in errors if e["type"] == "extra_forbidden"), errors[0])
     path = [str(part) for part in first["loc"]]
-    said = _without_tags(model, path)
+    kinds = _kinds_refused(model, errors, path)
+    said = _without_tags(model, path[:-1] if kinds else path)
     place = ".".join([where, *said] if where else said)
+    if kinds:
+        return f"{place}: input should be {_as_of_a_file(' or '.join(kinds))}, found {_show(first['input'])}"
     if first["type"] == "extra_forbidden":
         known = _fields_at(model, path[:-1])
         close = nearest(path[-1], known)
@@ -151,14 +156,34 @@ def describe(
     if first["type"] in {"too_long", "too_short"}:
         bound, key = ("at most", "max_length") if first["type"] == "too_long" else ("at least", "min_length")
         message = f"expected {bound} {first['ctx'][key]} items, found {first['ctx']['actual_length']}"
-    message = message[:1].lower() + message[1:]
-    # A file knows mappings and lists, not Python's classes.
-    message = re.sub(r" or instance of \w+$", "", message)
-    message = message.replace("a valid dictionary", "a mapping").replace("a valid tuple", "a list")
+    message = _as_of_a_file(message[:1].lower() + message[1:])
     # A rule that says itself what it found, or is about the whole file: the dump would only bury it.
     if place and ", found " not in message:
         message += f", found {_show(first['input'])}"
     return f"{place}: {message}" if place else message
+
+
+def _as_of_a_file(message: str) -> str:
+    """A file knows mappings and lists, not Python's classes."""
+    message = re.sub(r" or instance of \w+$", "", message)
+    return message.replace("a valid dictionary", "a mapping").replace("a valid tuple", "a list")
+
+
+def _kinds_refused(model: type[BaseModel], errors: Sequence[Mapping[str, Any]], path: list[str]) -> list[str]:
+    """What a value should be that may be of several plain kinds and is of none; empty: it may be of one.
+
+    Pydantic tells an error for each kind and puts the kind behind the key.
+    """
+    field = _model_at(model, path[:-2]).model_fields.get(path[-2]) if len(path) > 1 else None
+    kinds = [] if field is None else [kind for kind in get_args(field.annotation) if kind is not NoneType]
+    if field is None or len(kinds) < 2 or get_origin(field.annotation) not in (Union, UnionType):
+        return []
+    said = [error["msg"] for error in errors if [str(part) for part in error["loc"][:-1]] == path[:-1]]
+    if not all(
+        text.startswith(_SHOULD) for text in said
+    ):  # a rule of one kind tells more than all kinds' names
+        return []
+    return [text.removeprefix(_SHOULD).split(", ")[0] for text in said]
 
 
 def elsewhere(model: type[BaseModel], key: str, more: Places, *, exactly: bool = False) -> str | None:

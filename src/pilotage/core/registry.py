@@ -16,7 +16,7 @@ from pilotage.core.checked import Gives, checked
 from pilotage.core.config import Config, validate
 from pilotage.core.errors import InputError, unknown_name
 from pilotage.core.misfit import told
-from pilotage.core.plugins import giver, load_plugins, take
+from pilotage.core.plugins import giver, is_from_outside, load_plugins, take
 
 RENAMED = {"ekf-slow-errors": "ekf-gauss-markov", "mcl-likelihood-field": "particle-filter"}
 """Components' old names, each with today's."""
@@ -60,6 +60,7 @@ class Registry(Generic[T]):
             self._require_kinds(name, cls, config)
             if not cls.__module__.startswith("pilotage."):
                 self._load()  # so that who comes from outside and takes a name of ours is the one refused
+                self._require_parameters(name, config, complete=False)
             if name in self._entries:
                 whose = giver(self._entries[name].factory.__module__)
                 raise InputError(
@@ -91,6 +92,15 @@ class Registry(Generic[T]):
                 "component itself"
             )
 
+    def _require_parameters(
+        self, name: str, config: type[Config], whose: str = "", *, complete: bool
+    ) -> None:
+        from pilotage.core.parameters import unfit_parameters
+
+        wrong = unfit_parameters(config, complete=complete)
+        if wrong:
+            raise InputError(f"{self.role} '{name}'{whose}: expected {wrong}")
+
     def add_config(self, name: str) -> Callable[[C], C]:
         """Register a class that is its own config: one whose description is all there is to it."""
 
@@ -106,7 +116,7 @@ class Registry(Generic[T]):
             raise InputError(f"{self.role} '{name}': is now '{RENAMED[name]}'")
         if name not in self._entries:
             raise unknown_name(self.role, name, self._entries)
-        found = self._entries[name]
+        found = self._whole(self._entries[name])
         take(found.factory.__module__)
         return found
 
@@ -121,7 +131,14 @@ class Registry(Generic[T]):
 
     def __iter__(self) -> Iterator[Entry[T]]:
         self._load()
-        return iter([self._entries[name] for name in sorted(self._entries)])
+        return iter([self._whole(self._entries[name]) for name in sorted(self._entries)])
+
+    def _whole(self, entry: Entry[T]) -> Entry[T]:
+        """An entry whose config is complete: a plugin's may name a type that stood below it."""
+        if not entry.config.__pydantic_complete__ and is_from_outside(entry.config.__module__):
+            whose = f" of {giver(entry.config.__module__)}"
+            self._require_parameters(entry.name, entry.config, whose, complete=True)
+        return entry
 
     def _load(self) -> None:
         if not self._loaded:

@@ -19,6 +19,8 @@ _PARSER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _UNKNOWN_TAG = re.compile(r"could not determine a constructor for the tag '(?:tag:yaml\.org,2002:|!)?(.*)'")
 _HALF_PAIR = re.compile("[\ud800-\udfff]")
 _NUMBERS = frozenset({"tag:yaml.org,2002:int", "tag:yaml.org,2002:float"})
+_TRUTH = "tag:yaml.org,2002:bool"
+_NO_NAMES = frozenset({_TRUTH, "tag:yaml.org,2002:null", "tag:yaml.org,2002:timestamp"})
 # What PyYAML's constructors stumble over where a tag and its text do not belong together.
 _MISFITS = (TypeError, LookupError, AttributeError)
 
@@ -45,6 +47,8 @@ def load_yaml(text: str, where: str) -> Any:
         # The C parser counts one line more at the end of the text.
         line = f" line {min(mark.line, text.count(chr(10))) + 1}" if mark is not None else ""
         problem = getattr(error, "problem", None) or str(error) or "not YAML"
+        if mark is not None and text[mark.index : mark.index + 1] == "\t":
+            problem = "a tab where YAML takes spaces"
         problem = _UNKNOWN_TAG.sub(r"the tag '!!\1', which has no meaning here", problem)
         raise InputError(f"{where}{line}: expected YAML, found: {problem}") from None
     except (ValueError, OverflowError) as error:  # a date that is none
@@ -65,6 +69,13 @@ class _Constructor(yaml.constructor.SafeConstructor):
 
 def _problem(text: str, place: Any) -> yaml.MarkedYAMLError:
     return yaml.MarkedYAMLError(problem=text, problem_mark=place.start_mark)
+
+
+def _as_key(node: yaml.Node) -> yaml.Node:
+    """A key as it is written: YAML 1.1 reads `on`, `no` and `null` as no names, and parameters have such."""
+    if isinstance(node, yaml.ScalarNode) and node.tag in _NO_NAMES and node.value:
+        return yaml.ScalarNode("tag:yaml.org,2002:str", node.value, node.start_mark, node.end_mark)
+    return node
 
 
 class _Weight:
@@ -146,6 +157,7 @@ class _Composer:
             if isinstance(around, yaml.SequenceNode):
                 around.value.append(node)
             elif keys[-1] is None:
+                node = _as_key(node)
                 self._once(node, seen[-1])
                 keys[-1] = node
             else:
@@ -158,7 +170,12 @@ class _Composer:
         tag = event.tag
         if tag is None or tag == "!":
             tag = self._resolver.resolve(yaml.ScalarNode, event.value, event.implicit)
-        if tag in _NUMBERS and event.tag is None and ":" in event.value:  # YAML 1.1 counted in sixties
+        if event.tag is None and (
+            (tag in _NUMBERS and ":" in event.value)  # YAML 1.1 counted in sixties
+            or (
+                tag == _TRUTH and event.value.lower() not in ("true", "false")
+            )  # and took `on` and `no` for one
+        ):
             tag = "tag:yaml.org,2002:str"
         if tag in _NUMBERS and len(event.value) > NUMBER_LENGTH:
             raise _problem(f"a number of {len(event.value)} characters", event)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
-from pydantic_core import PydanticUndefined
+from pydantic_core import PydanticUndefined, to_jsonable_python
 
 from pilotage.core.config import Config
 from pilotage.core.errors import InputError, nearest
+from pilotage.core.parameters import schema_of
 from pilotage.evaluation.metric import Direction
 from pilotage.evaluation.metrics import METRICS
 from pilotage.experiments.mission import read_mission, shipped_missions
@@ -66,7 +68,7 @@ def components(name: str | None = None) -> list[tuple[str, str, str]]:
 
 def _parameters(config: type[Config]) -> list[tuple[str, str, str]]:
     """Parameter, default, and what values it takes."""
-    schema = config.model_json_schema()
+    schema = schema_of(config)
     rows = []
     for name, field in config.model_fields.items():
         if field.is_required():
@@ -74,19 +76,29 @@ def _parameters(config: type[Config]) -> list[tuple[str, str, str]]:
         elif field.default is PydanticUndefined or isinstance(field.default, Config):
             default = "see schema"
         else:
-            default = "none" if field.default is None else f"{field.default}"
-        rows.append((name, default, _values(schema["properties"][name])))
+            default = _as_in_a_file(field.default)
+        rows.append((name, default, _values(schema["properties"][name], schema.get("$defs", {}))))
     return rows
 
 
-def _values(schema: dict[str, Any]) -> str:
+def _as_in_a_file(value: Any) -> str:
+    """A default as a mission says it, so that it can be set again as it stands."""
+    plain = to_jsonable_python(value, fallback=str)
+    return plain if isinstance(plain, str) else json.dumps(plain)
+
+
+def _values(schema: dict[str, Any], definitions: dict[str, Any]) -> str:
     """The values that a JSON schema allows, in a few words."""
     if "anyOf" in schema:
-        return " or ".join(_values(part) for part in schema["anyOf"])
+        return " or ".join(_values(part, definitions) for part in schema["anyOf"])
     if "enum" in schema:
-        return " | ".join(str(value) for value in schema["enum"])
+        return " | ".join(map(_as_in_a_file, schema["enum"]))
+    if "const" in schema:
+        return _as_in_a_file(schema["const"])
     if "$ref" in schema:
-        return str(schema["$ref"].rsplit("/", 1)[-1])
+        name = str(schema["$ref"].rsplit("/", 1)[-1])
+        meant = definitions.get(name, {})
+        return _values(meant, definitions) if "enum" in meant or "const" in meant else name
     words = [str(schema.get("type", "value"))]
     bounds = (("minimum", ">="), ("exclusiveMinimum", ">"), ("maximum", "<="), ("exclusiveMaximum", "<"))
     words += [f"{sign} {schema[key]:g}" for key, sign in bounds if key in schema]

@@ -15,7 +15,8 @@ from pilotage.core.limits import DATA_BYTES, limit, too_large
 from pilotage.core.types import Pose2
 from pilotage.maps.ascii_grid import read_ascii_grid
 from pilotage.maps.elevation import ElevationModel, HeightArray
-from pilotage.maps.grid_file import GEOTIFF, read_array
+from pilotage.maps.grid_file import read_array
+from pilotage.maps.grid_image import GEOTIFF
 from pilotage.maps.memory import require_memory
 from pilotage.maps.occupancy_grid import CORNER
 

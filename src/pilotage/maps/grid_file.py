@@ -9,14 +9,12 @@ import numpy as np
 from pilotage.core.errors import InputError
 from pilotage.core.files.arrays import read_npy
 from pilotage.core.types import Pose2
-from pilotage.maps.grid_image import read_hazard_image
+from pilotage.maps.grid_image import GEOTIFF, IMAGES, read_hazard_image
 from pilotage.maps.memory import require_memory
 from pilotage.maps.moving_ai import read_moving_ai_map
 from pilotage.maps.occupancy_grid import CORNER, OccupancyGrid
 from pilotage.maps.ros_map import read_ros_map
 
-GEOTIFF = frozenset({".tif", ".tiff"})
-IMAGES = frozenset({".png", ".pgm", ".pbm", ".bmp", ".jpg", ".jpeg"}) | GEOTIFF
 GRID_SUFFIXES = frozenset({".map", ".npy", ".yaml", ".yml"}) | IMAGES
 
 

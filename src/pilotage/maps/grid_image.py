@@ -18,6 +18,8 @@ ByteArray = NDArray[np.uint8]
 GreyArray = NDArray[np.uint8] | NDArray[np.uint16]
 """Lightness from 0 to what the type can hold."""
 
+GEOTIFF = frozenset({".tif", ".tiff"})
+IMAGES = frozenset({".png", ".pgm", ".pbm", ".bmp", ".jpg", ".jpeg"}) | GEOTIFF
 WHITE_FROM = 128
 DEEPEST = 65535
 STEP = 257

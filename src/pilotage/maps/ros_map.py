@@ -2,9 +2,9 @@
 
 The rules are those of the Navigation 2 map server: lightness s in [0, 1] means occupancy p = 1 - s, or
 p = s with ``negate``. ``trinary``: occupied above ``occupied_thresh``, free below ``free_thresh``, else
-unknown. ``scale``: the same, but between the thresholds from 0 to 100 in proportion, and what is not
-opaque is unknown. ``raw``: the pixel's value itself from 0 to 100, others unknown; of 16 bits a pixel, what
-8 would say.
+unknown. ``scale``: the same, but between the thresholds from 0 to 100 in proportion. What is not opaque is
+unknown in both. ``raw``: the pixel's value itself from 0 to 100, others unknown; of 16 bits a pixel, what
+8 would say. Keys that it does not know are none of its business.
 
 But for one thing: where an image has the greys alone that map_saver writes, 205 is what it was for map_saver,
 unknown. With the threshold that Navigation 2 writes beside it, 0.25, its own map server calls that free.
@@ -12,8 +12,9 @@ unknown. With the threshold that Navigation 2 writes beside it, 0.25, its own ma
 
 from __future__ import annotations
 
+import difflib
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 from typing import Any, Literal, TypeVar
 
 import numpy as np
@@ -22,14 +23,18 @@ from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 
 from pilotage.core.config import Config, validate
-from pilotage.core.errors import InputError
+from pilotage.core.errors import InputError, nearest
 from pilotage.core.files import read_yaml
+from pilotage.core.neighbours import hint_beside
 from pilotage.core.types import Pose2
-from pilotage.maps.grid_image import DEEPEST, ByteArray, GreyArray, as_bytes, read_grey, write_grey
+from pilotage.maps.grid_image import DEEPEST, IMAGES, ByteArray, GreyArray, as_bytes, read_grey, write_grey
 from pilotage.maps.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyArray, OccupancyGrid
 
 SAVED_UNKNOWN, SAVED = 205, frozenset({0, 205, 254, 255})
 """Grey of what is unknown, and all greys, of a map that map_saver wrote; some programs paint with 255."""
+
+LIKE = 0.75
+"""So like a key that a file need not have another one is it, misspelt; `name` is half like `mode`."""
 
 Entry = TypeVar("Entry", bound=np.generic)
 
@@ -49,6 +54,16 @@ class RosMapFile(Config):
     @classmethod
     def _yaw_may_be_missing(cls, value: Any) -> Any:
         return [*value, 0.0] if isinstance(value, list | tuple) and len(value) == 2 else value
+
+    @field_validator("mode", mode="before")
+    @classmethod
+    def _in_any_case(cls, value: Any) -> Any:
+        return value.lower() if isinstance(value, str) else value
+
+    @field_validator("negate", mode="before")
+    @classmethod
+    def _any_number_but_zero(cls, value: Any) -> Any:
+        return value != 0 if isinstance(value, int) else value
 
     @model_validator(mode="after")
     def _thresholds_in_order(self) -> RosMapFile:
@@ -110,17 +125,13 @@ class RosMap:
         if file.mode == "raw":
             raw = np.arange(256)
             return _looked_up(np.where(raw <= OCCUPIED, raw, UNKNOWN).astype(np.int8), as_bytes(self.pixels))
-        if file.mode == "trinary" and self.alpha is not None:
-            # map_server counts transparency as one more channel beside red, green and blue.
-            shade = (3.0 * as_bytes(self.pixels) + self.alpha) / (4.0 * 255.0)
-            return self._occupancy(shade)
         if self.pixels.dtype == np.uint16:
             return _looked_up(self._occupancy(np.arange(DEEPEST + 1) / DEEPEST), self.pixels)
         table = self._occupancy(np.arange(256) / 255.0)
         if file.mode == "trinary" and not file.negate and SAVED.issuperset(np.unique(self.pixels).tolist()):
             table[SAVED_UNKNOWN] = UNKNOWN
         cells = _looked_up(table, self.pixels)
-        if file.mode == "scale" and self.alpha is not None:
+        if self.alpha is not None:
             cells[self.alpha < 255] = UNKNOWN
         return cells
 
@@ -147,7 +158,7 @@ def _looked_up(table: NDArray[Entry], pixels: GreyArray) -> NDArray[Entry]:
 
 
 def read_ros_map(path: Path) -> RosMap:
-    """Read a YAML file and its image, which lies beside it unless its path is absolute.
+    """Read a YAML file and its image, by its path from there, or beside it where that leads nowhere.
 
     Raises
     ------
@@ -159,13 +170,49 @@ def read_ros_map(path: Path) -> RosMap:
 
 def parse_ros_map(values: Any, path: Path) -> RosMap:
     """Build a map from the parsed YAML file at ``path``; InputError as ``read_ros_map``."""
-    file = validate(RosMapFile, values, str(path))
-    image = path.parent / file.image
-    if not image.is_file():
-        beside = path.parent / image.name  # the path is often that on the robot which made the map
-        hint = f"; take 'image: {image.name}', which lies beside it" if beside.is_file() else ""
-        raise InputError(f"{path}: image: expected a file '{image}', found none{hint}")
-    return RosMap(file, *read_grey(image))
+    file = validate(RosMapFile, _known(values), str(path))
+    return RosMap(file, *read_grey(image_of(path, file.image)))
+
+
+def _known(values: Any) -> Any:
+    """What a map server reads of a file: others write into it what other programs read (layers, frames).
+
+    A key that is like one which is not there is most likely that one, misspelt, and stays to be told: where
+    the file does not do without it any, and else where it is very like it.
+    """
+    if not isinstance(values, dict):
+        return values
+    fields = {name: field for name, field in RosMapFile.model_fields.items() if name not in values}
+    needed = [name for name, field in fields.items() if field.is_required()]
+
+    def is_one_misspelt(key: str) -> bool:
+        return bool(nearest(key, needed) or difflib.get_close_matches(key.lower(), fields, 1, LIKE))
+
+    return {
+        key: value
+        for key, value in values.items()
+        if key in RosMapFile.model_fields or is_one_misspelt(str(key))
+    }
+
+
+def image_of(path: Path, named: str) -> Path:
+    """The image: where the file says, else under its name beside the file, as it is after both were moved.
+
+    Raises
+    ------
+    InputError
+        Where it is in neither place.
+    """
+    image = path.parent / named
+    beside = path.parent / PureWindowsPath(named).name  # which parts names at either slash
+    if image.is_file():
+        return image
+    if not beside.is_file():
+        hint = hint_beside(beside, IMAGES)
+        raise InputError(
+            f"{path}: image: expected a file '{image}', or one of its name beside it, found none{hint}"
+        )
+    return beside
 
 
 def write_ros_map(path: Path, ros_map: RosMap) -> None:

@@ -46,8 +46,8 @@ def joint_lidar(sensors: Mapping[str, SensorConfig], where: str = "robot.sensors
             f"{where}: expected lidars of one rate_hz, which are joined to one scan, found {told}; "
             f"give them one rate_hz, or take one off (--set {where}.{list(lasers)[-1]}=null)"
         )
-    first_rad, view_rad = _arc(sheets)
     step_rad = min((sheet.beam_step_rad for sheet in sheets if sheet.beams > 1), default=math.radians(1.0))
+    first_rad, view_rad = _arc(sheets, step_rad)
     whole = view_rad >= _FULL
     beams = max(2, math.ceil(view_rad / step_rad - 1e-9) + (0 if whole else 1))
     middle = math.remainder(first_rad + 0.5 * view_rad, 2.0 * math.pi)
@@ -80,8 +80,12 @@ def places_of_lasers_m(sheet: LidarConfig, sensors: Mapping[str, SensorConfig]) 
     return np.array(places).reshape(-1, 2)
 
 
-def _arc(sheets: list[LidarConfig]) -> tuple[float, float]:
-    """Where the least arc around all that they look at begins, and how wide it is."""
+def _arc(sheets: list[LidarConfig], step_rad: float) -> tuple[float, float]:
+    """Where the least arc around all that they look at begins, and how wide it is.
+
+    Views that end where others begin, but for less than a step between beams, as two half circles do by
+    rounding, leave no gap.
+    """
     views = sorted(
         ((sheet.mount.theta_rad - 0.5 * sheet.field_of_view_rad) % (2.0 * math.pi), sheet.field_of_view_rad)
         for sheet in sheets
@@ -91,7 +95,7 @@ def _arc(sheets: list[LidarConfig]) -> tuple[float, float]:
     for start, _ in views:
         ends = [(other + width - start) % (2.0 * math.pi) for other, width in views]
         covered = any(
-            (start - other) % (2.0 * math.pi) <= width and other != start for other, width in views
+            (start - other) % (2.0 * math.pi) < width + step_rad and other != start for other, width in views
         ) or any(width >= _FULL for _, width in views)
         gap = 0.0 if covered else 2.0 * math.pi - max(ends)
         if gap > best_rad:

@@ -156,13 +156,16 @@ def _ranges(message: Any, sheet: LidarConfig) -> FloatArray:
     """The message's ranges along the data sheet's beams, each from the nearest of its own, after REP 117.
 
     Minus infinity, and less than the least range, is something too near to be measured, and reads as the
-    least range. Zero is what many drivers write where nothing returned; that, what is beyond the limits and
-    what was not measured at all reads as nothing within reach: the stack takes finite ranges.
+    least range. Infinity and more than the greatest is nothing within reach, as far as the scanner's own
+    reach says so for the data sheet's. NaN, and the zero that many drivers write for it, is no measurement,
+    as are directions that no beam looks to: the ground there is not known to be free.
     """
     told = np.asarray(message.ranges, dtype=np.float64)
     least = max(message.range_min, 0.0)
     farthest = message.range_max if message.range_max > least else np.inf  # some drivers leave it at zero
     too_near = np.isneginf(told) | ((told > 0.0) & (told < least))
-    ranges = np.where(too_near, least, np.where((told <= 0.0) | (told > farthest), np.nan, told))
-    found = sheet.along_own_beams(ranges, message.angle_min, message.angle_increment)
-    return np.where(np.isnan(found), sheet.max_range_m, found)
+    nothing = np.inf if farthest >= sheet.sure_range_m else np.nan
+    ranges = np.where(
+        too_near, least, np.where(told > farthest, nothing, np.where(told == 0.0, np.nan, told))
+    )
+    return sheet.along_own_beams(ranges, message.angle_min, message.angle_increment)

@@ -88,12 +88,14 @@ class Metrics:
     def costs_of(self, task: str, given: Iterable[str]) -> tuple[Metric, ...]:
         """The metrics that judge a task beside success, of those given; what matters most first.
 
-        Of a task that nobody told of: every given one with a direction, in the table's order.
+        Of a task that nobody told of: every given one with a direction, in the table's order; none of the
+        clock on the wall.
         """
         names = frozenset(given)
         if task in self._decisive:
             return tuple(self._by_key[key] for key in self._decisive[task] if key in names)
-        return tuple(m for m in self if m.key in names and m.less_is_better is not None)
+        known = (metric for metric in self if metric.key in names and metric.clock is not Clock.WALL)
+        return tuple(metric for metric in known if metric.less_is_better is not None)
 
     def is_wall_clock(self, key: str) -> bool:
         """Whether a metric is never the same twice, for it is one of the clock on the wall."""

@@ -13,11 +13,13 @@ import numpy as np
 
 from pilotage.core.config import validate
 from pilotage.core.errors import InputError
+from pilotage.core.plugins import is_from_outside
 from pilotage.core.types import FloatArray
 from pilotage.evaluation.judge import SUCCESS, Judgement, judge
 from pilotage.evaluation.metric import Aspect, Metric
 from pilotage.evaluation.metrics import METRICS
 from pilotage.evaluation.paired import Difference
+from pilotage.evaluation.tasks.task import TASKS
 from pilotage.experiments.given import has
 from pilotage.experiments.mission import load_mission, mission_of
 from pilotage.experiments.oracles.applicable import applicable
@@ -61,7 +63,7 @@ def attribution_study(mission: str, overrides: Sequence[str], trials: int) -> St
         raise InputError(f"attribute '{mission}': expected a mission with modules that an oracle can replace")
     configurations: list[dict[str, Any]] = [{"name": BASELINE, "set": {"run.oracles": list(own)}}]
     configurations += [{"name": f"{ORACLE}{name}", "set": {"run.oracles": [*own, name]}} for name in oracles]
-    primary, named = costs[0], Path(mission).stem
+    named = Path(mission).stem
     changed = f" (with {', '.join(overrides)})" if overrides else ""
     values: dict[str, Any] = {
         "study": _name(mission, overrides),
@@ -70,11 +72,12 @@ def attribution_study(mission: str, overrides: Sequence[str], trials: int) -> St
         "set": settings_of(overrides),
         "configurations": configurations,
         "trials": trials,
-        "metrics": [metric.key for metric in costs],
-        "primary": primary.key,
-        "lower_is_better": primary.less_is_better,
         "baseline": BASELINE,
     }
+    # Which metrics runs of a stranger's task give shows when they do: then all of those are reported.
+    if not is_from_outside(TASKS.entry(loaded.task.name).factory.__module__):
+        values["metrics"] = [metric.key for metric in costs]
+        values |= {"primary": costs[0].key, "lower_is_better": costs[0].less_is_better}
     return make_study(validate(StudyDefinition, values, ""))
 
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from pilotage.core.errors import InputError
 from pilotage.core.files import opened, read_yaml
 from pilotage.experiments.named_files import WORDS, anchored, named_file
+from pilotage.maps.ros_map import image_of
 
 YAML = frozenset({".yaml", ".yml"})
 
@@ -27,7 +29,7 @@ def digests(values: Any) -> dict[str, str]:
                 while part := file.read(1 << 20):
                     digest.update(part)
             found[real] = digest.hexdigest()[:16]
-            if path.suffix in YAML:
+            if path.suffix.lower() in YAML:
                 waiting += _inside(path)
     return found
 
@@ -52,4 +54,9 @@ def _inside(path: Path) -> Iterable[Path]:
         values = read_yaml(path)
     except InputError:
         return ()
-    return tuple(_named(anchored(values, (path.parent,))))
+    found = list(_named(anchored(values, (path.parent,))))
+    image = values.get("image") if isinstance(values, dict) else None
+    if isinstance(image, str):
+        with suppress(InputError):  # a ROS map's, which may lie beside it instead of where it says
+            found.append(image_of(path, image))
+    return tuple(found)

@@ -24,16 +24,23 @@ def evenly_spaced(angles: FloatArray) -> bool:
 
 @kernel
 def cleaned_ranges(ranges: FloatArray, max_range: float) -> tuple[FloatArray, int]:
-    """Ranges (N,) with ``max_range`` where there is none, and how many of them were 0 or less."""
+    """Ranges (N,), ``max_range`` where nothing returned and 0 where nothing was measured; how many were 0.
+
+    A beam that is NaN measured nothing (REP 117): it passed through no ground, and ends nowhere. Where all
+    are, all were 0: such a laser is covered as well.
+    """
     out = ranges.copy()
-    silent = 0
+    silent = unmeasured = 0
     for k in range(out.shape[0]):
-        if not math.isfinite(out[k]):
+        if math.isnan(out[k]):
+            out[k] = 0.0
+            unmeasured += 1
+        elif math.isinf(out[k]):
             out[k] = max_range
         elif out[k] <= 0.0:
-            out[k] = max_range
+            out[k] = 0.0
             silent += 1
-    return out, silent
+    return out, silent if unmeasured < out.shape[0] else unmeasured
 
 
 @kernel

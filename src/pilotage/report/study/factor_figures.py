@@ -76,7 +76,7 @@ def lines_over(table: StudyTable, cells: Sequence[Cell], factor: str) -> list[Li
         others = [f for f in others if f not in named or _is_number(numeric[0].values.get(f))]
     groups: dict[tuple[object, ...], list[Cell]] = defaultdict(list)
     for cell in numeric:
-        groups[tuple(cell.values.get(f) for f in others)].append(cell)
+        groups[tuple(_kept_apart(cell.values.get(f)) for f in others)].append(cell)
     kept = {key: line for key, line in groups.items() if len({c.values[factor] for c in line}) > 1}
     kept = dict(sorted(kept.items(), key=lambda entry: [v if _is_number(v) else 0.0 for v in entry[0]]))
     differing = [i for i in range(len(others)) if len({key[i] for key in kept}) > 1]
@@ -84,6 +84,11 @@ def lines_over(table: StudyTable, cells: Sequence[Cell], factor: str) -> list[Li
         return [("mean with its 95 % interval", next(iter(kept.values())))]
     names = [", ".join(_said(table, others[i], key[i]) for i in differing) for key in kept]
     return list(zip(names, kept.values(), strict=True))[: len(COLOURS)]
+
+
+def _kept_apart(value: object) -> float | str:
+    """What tells a line's values from another's: numbers, and texts for all else, lists and mappings too."""
+    return value if isinstance(value, int | float) and _is_number(value) else str(value)
 
 
 def _said(table: StudyTable, factor: str, value: object) -> str:

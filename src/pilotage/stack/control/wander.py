@@ -17,6 +17,9 @@ from pilotage.sensors.readings import LidarScan, Readings
 from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.knowledge import RobotKnowledge
 
+LEAST_SHARE = 0.5
+"""Of the beams that look down a lane so many have to have measured something, or that nothing is there."""
+
 
 class WanderConfig(Config):
     """Where it likes to go and how near it lets things come."""
@@ -60,6 +63,11 @@ class Wanderer:
         self._arm = np.array([lidar.mount.x_m, lidar.mount.y_m])
         half_view = min(0.5 * lidar.field_of_view_rad, math.pi) - 0.2
         self._headings = np.linspace(-half_view, half_view, config.directions)
+        self._lanes_rad = np.append(self._headings, 0.0)
+        beams_rad = np.arctan2(self._directions[:, 1], self._directions[:, 0])
+        beside = np.abs(wrap_array_to_pi(beams_rad - self._lanes_rad[:, np.newaxis]))
+        # Which beams (K + 1, N) look down a lane: where none does, as behind a laser, it is none.
+        self._looks = beside <= max(math.atan2(self._half_width, config.go_m), lidar.beam_step_rad)
         self._turning = self._turned_rad = 0.0
         self._dt_s = robot.dt_s
         self._command = STOP
@@ -100,17 +108,25 @@ class Wanderer:
             return False
         return True
 
+    def _free_m(self, ranges_m: FloatArray) -> FloatArray:
+        """Free lengths (K + 1,) along the headings and straight ahead; 0 where too few beams look."""
+        measured = ~np.isnan(ranges_m)
+        points = (clustering.scan_points(ranges_m, self._directions) + self._arm)[measured]
+        free = wander.free_lengths(points, self._lanes_rad, self._half_width, self._config.reach_m)
+        looks = self._looks.sum(axis=1)
+        unseen = (looks == 0) | ((self._looks & measured).sum(axis=1) < LEAST_SHARE * looks)
+        return np.where(unseen, 0.0, free)
+
     def _choose(self, ranges_m: FloatArray, bearing_rad: float | None) -> Twist:
         config = self._config
-        points = clustering.scan_points(ranges_m, self._directions) + self._arm
-        free = wander.free_lengths(points, self._headings, self._half_width, config.reach_m)
+        lengths = self._free_m(ranges_m)
+        free, ahead = lengths[:-1], float(lengths[-1])
         if bearing_rad is None:
             worth = free - config.turn_cost_m_per_rad * np.abs(self._headings)
         else:
             away = np.abs(wrap_array_to_pi(self._headings - bearing_rad))
             worth = np.minimum(free, config.led_reach_m) - config.turn_cost_m_per_rad * away
         best = float(self._headings[int(np.argmax(worth))])
-        ahead = float(wander.free_lengths(points, np.zeros(1), self._half_width, config.reach_m)[0])
         if self._turns_on(ahead, best):
             return Twist(0.0, self._turning)
         turn = config.gain_per_s * best

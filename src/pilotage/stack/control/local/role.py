@@ -69,7 +69,8 @@ class LocalView:
     twist
         Measured speed and turn rate.
     ranges_m
-        (N,) of the laser; ``max_range_m`` and above, 0 and NaN mean no echo.
+        (N,) of the laser; ``max_range_m`` and above mean no echo, 0 and NaN that nothing was measured: the
+        ground there is not known to be free.
     beam_angles_rad
         (N,) directions in the sensor's frame, evenly spaced and increasing.
     mount
