@@ -243,11 +243,8 @@ _FONT = re.compile(r"font: (?:(\w+) )?([\d.]+)px [^;\"]*")
 _FAMILY = re.compile(r"font-family: [^;\"]*;? ?")
 _GROUP_ID = re.compile(r" id=\"(?!layer-)[A-Za-z.]+\w*_\d+\"")
 _LAYER_ID = re.compile(r" id=\"layer-([a-z0-9-]+)\"")
-_ANY_ID = re.compile(r" id=\"([^\"]+)\"")
-_USE = re.compile(r"(?:xlink:)?href=\"#([^\"]+)\"")
-_URL = re.compile(r"url\(#([^)]+)\)")
 _OUTLINE = re.compile(r" d=\"([^\"]*)\"")
-_LONG_NUMBER = re.compile(r"(\.\d\d)\d+")
+_TOO_FINE = re.compile(r"(?<=\.\d\d)\d+")
 _LONG_PLACE = re.compile(r"( (?:x|y)=\"-?\d+\.\d\d)\d+\"")
 _NO_TURN = re.compile(r" transform=\"rotate\(-?0 [^)]*\)\"")
 _BETWEEN = re.compile(r">\s+<")
@@ -272,8 +269,8 @@ def render(figure: Figure, slug: str, alt: str) -> str:
     svg = _FAMILY.sub("", _FONT.sub(_font_size, svg))
     # Several artists may make up one layer, and an identifier may be there but once.
     svg = _LAYER_ID.sub(r' class="layer-\1"', _GROUP_ID.sub("", svg))
-    svg = _ANY_ID.sub(rf' id="{slug}-\1"', svg)
-    svg = _URL.sub(rf"url(#{slug}-\1)", _USE.sub(rf'href="#{slug}-\1"', svg))
+    svg = svg.replace(' id="', f' id="{slug}-').replace("url(#", f"url(#{slug}-")
+    svg = svg.replace('xlink:href="#', 'href="#').replace('href="#', f'href="#{slug}-')
     svg = _ROOT.sub(rf'<svg viewBox="\1" role="img" aria-label="{_attribute(alt)}">', svg, count=1)
     return _BETWEEN.sub("><", svg).strip()
 
@@ -341,7 +338,7 @@ def _clip_alike(first: Tick, made: Tick) -> None:
 
 
 def _short_outline(match: re.Match[str]) -> str:
-    numbers = _LONG_NUMBER.sub(r"\1", match.group(1))
+    numbers = _TOO_FINE.sub("", match.group(1))
     return f' d="{numbers.replace(chr(10), "").replace(" L ", "L").replace(" z", "z").strip()}"'
 
 
