@@ -21,6 +21,7 @@ from pilotage.logs.bags import read_bag
 from pilotage.logs.laser_log import LaserLog
 from pilotage.logs.message_types import shared, told_types
 from pilotage.logs.rosbags_extra import rosbags
+from support.damage import endless_rows
 from support.laser_bags import FORMS, Drive, Scan, drive, with_scan, write_ros1, write_ros2
 
 pytest.importorskip("rosbags")
@@ -336,6 +337,12 @@ def test_a_description_of_far_too_much_is_not_handed_to_the_library(
     handed = "rosbags.highlevel.AnyReader.__init__"
     monkeypatch.setattr(handed, lambda *_, **__: pytest.fail("it was handed over"))
     assert len(read_bag(path)) == 30
+
+
+def test_a_database_whose_rows_never_end_is_given_up(tmp_path: Path) -> None:
+    (tmp_path / "a.db3").write_bytes(endless_rows())
+    with pytest.raises(InputError, match="rows without end"):
+        read_bag(tmp_path / "a.db3")
 
 
 def test_a_cut_bag_of_packed_messages(tmp_path: Path) -> None:
