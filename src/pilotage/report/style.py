@@ -10,7 +10,7 @@ import io
 import math
 import re
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from copy import copy
 from dataclasses import dataclass
@@ -25,6 +25,7 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Outline
+from matplotlib.text import Text
 from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import Bbox, Transform
 
@@ -301,6 +302,7 @@ def _let_ticks_be_as_told(figure: Figure) -> None:
     for axes in figure.axes:
         for axis in (axes.xaxis, axes.yaxis):
             for tick in axis.majorTicks:
+                _lay_out_once(tick.label1)
                 if tick.get_tick_padding() == 0.0:  # it has no length
                     tick.tick1line.set_visible(False)
             vars(axis)["_get_tick"] = partial(_tick_of, axis)
@@ -327,7 +329,25 @@ def _tick_of(axis: Any, major: bool) -> Tick:
         if part.get_visible():
             name = next(name for name, value in vars(made).items() if value is part)
             setattr(made, name, copy(part))
+    _lay_out_once(made.label1)
     return made
+
+
+def _lay_out_once(label: Text) -> None:
+    """Where a number's box lies is asked to place its axis's words, and once more to draw it."""
+    lay_out: Callable[..., Any] | None = getattr(type(label), "_get_layout", None)
+    if lay_out is None:
+        return
+    kept: dict[tuple[object, ...], Any] = {}
+
+    def layout(renderer: object) -> Any:
+        told = label.get_text(), label.get_rotation(), label.get_fontsize()
+        if told not in kept:
+            kept.clear()
+            kept[told] = lay_out(label, renderer)
+        return kept[told]
+
+    vars(label)["_get_layout"] = layout
 
 
 def _clip_alike(first: Tick, made: Tick) -> None:
