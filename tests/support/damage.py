@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import gzip
+import io
 import json
 import os
 import random
@@ -17,6 +18,7 @@ from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import yaml
 
 from pilotage.core.yaml_text import load_yaml
@@ -267,6 +269,14 @@ def endless_rows() -> Content:
         return base.serialize()
 
 
+def signalling() -> Content:
+    """A NumPy file of numbers of which one is a NaN that processors signal: working with it warns."""
+    values, file = np.zeros((6, 6), np.float32), io.BytesIO()
+    values.view(np.uint32)[2, 3] = 0x7FA00000
+    np.save(file, values)
+    return file.getvalue()
+
+
 WHOLE: dict[str, Content] = {
     "empty": b"",
     "a line end": b"\n",
@@ -300,6 +310,7 @@ WHOLE: dict[str, Content] = {
     "beyond all doubles": b'{"a": 1e999, "b": 123456789012345678901234567890}',
     "ps": b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 10 10\n",
     "rows without end": endless_rows(),
+    "a signalling NaN": signalling(),
     "a thousand columns": (",".join(f"c{i}_m" for i in range(1000)) + "\n").encode()
     + (",".join(["1.5"] * 1000) + "\n").encode() * 12,
 }

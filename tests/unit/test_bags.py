@@ -112,6 +112,16 @@ def test_ranges_of_three_kinds(tmp_path: Path) -> None:
     )
 
 
+def test_a_range_that_signals_is_no_number(tmp_path: Path) -> None:
+    """A NaN of other bits, such as a damaged message may hold: NumPy warns where it is worked with."""
+    mark = np.float32(12345.5)
+    path = write_ros1(tmp_path / "a.bag", with_scan(drive(), 4, ranges_m=np.full(21, mark)))
+    path.write_bytes(path.read_bytes().replace(mark.tobytes(), np.uint32(0x7FA00000).tobytes()))
+    log = read_bag(path)
+    assert np.isnan(log.ranges_m[4]).all()
+    assert log.warnings == ("21 ranges are not numbers (3.3%): no measurement",)
+
+
 def test_times_that_go_back_are_sorted_and_told(tmp_path: Path) -> None:
     """The stamp, not the receipt, is a scan's time."""
     whole = drive()

@@ -12,6 +12,7 @@ from pilotage.bridges.ros import messages as ros
 from pilotage.bridges.ros.node import FLUSH_S, ros_node
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.errors import InputError
+from pilotage.core.files.arrays import quiet
 from pilotage.core.types import STOP, FloatArray, Pose2, Twist
 from pilotage.experiments.build.build import build
 from pilotage.missions.mission import Mission
@@ -159,7 +160,7 @@ def _ranges(message: Any, sheet: LidarConfig) -> FloatArray:
     least range. Zero is what many drivers write where nothing returned; that, what is beyond the limits and
     what was not measured at all reads as nothing within reach: the stack takes finite ranges.
     """
-    told = np.asarray(message.ranges, dtype=np.float64)
+    told = quiet(np.asarray(message.ranges)).astype(np.float64)
     least = max(message.range_min, 0.0)
     farthest = message.range_max if message.range_max > least else np.inf  # some drivers leave it at zero
     too_near = np.isneginf(told) | ((told > 0.0) & (told < least))
