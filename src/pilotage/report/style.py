@@ -276,6 +276,10 @@ def render(figure: Figure, slug: str, alt: str) -> str:
     return _BETWEEN.sub("><", svg).strip()
 
 
+MOST_LAYOUTS = 2000
+_LAYOUTS: dict[tuple[object, ...], Any] = {}
+"""Of numbers at axes, by what they say and how they are written."""
+
 _PLAIN = 1e-3, 9e5
 """Largest numbers of an axis that is labelled without a power of ten above it (``axes.formatter.limits``)."""
 
@@ -334,18 +338,26 @@ def _tick_of(axis: Any, major: bool) -> Tick:
 
 
 def _lay_out_once(label: Text) -> None:
-    """Where a number's box lies is asked to place its axis's words, and once more to draw it."""
+    """Where a number's box lies is asked to place its axis's words, and once more to draw it.
+
+    The same numbers stand at most axes of a page.
+    """
     lay_out: Callable[..., Any] | None = getattr(type(label), "_get_layout", None)
     if lay_out is None:
         return
-    kept: dict[tuple[object, ...], Any] = {}
 
     def layout(renderer: object) -> Any:
-        told = label.get_text(), label.get_rotation(), label.get_fontsize()
-        if told not in kept:
-            kept.clear()
-            kept[told] = lay_out(label, renderer)
-        return kept[told]
+        figure = label.get_figure()
+        told = (
+            *(label.get_text(), label.get_fontproperties(), label.get_rotation(), label.get_rotation_mode()),
+            *(label.get_horizontalalignment(), label.get_verticalalignment(), figure and figure.dpi),
+        )
+        found = _LAYOUTS.get(told)
+        if found is None:
+            if len(_LAYOUTS) >= MOST_LAYOUTS:
+                _LAYOUTS.clear()
+            found = _LAYOUTS[told] = lay_out(label, renderer)
+        return found
 
     vars(label)["_get_layout"] = layout
 
