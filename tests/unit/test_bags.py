@@ -21,6 +21,8 @@ from pilotage.logs.bags import read_bag
 from pilotage.logs.laser_log import LaserLog
 from pilotage.logs.message_types import shared, told_types
 from pilotage.logs.rosbags_extra import rosbags
+from pilotage.logs.salvage.found import BagFormat, Salvage
+from pilotage.logs.salvage.walk import WALKS
 from support.damage import endless_rows
 from support.laser_bags import FORMS, Drive, Scan, drive, with_scan, write_ros1, write_ros2
 
@@ -347,6 +349,19 @@ def test_a_description_of_far_too_much_is_not_handed_to_the_library(
     handed = "rosbags.highlevel.AnyReader.__init__"
     monkeypatch.setattr(handed, lambda *_, **__: pytest.fail("it was handed over"))
     assert len(read_bag(path)) == 30
+
+
+@pytest.mark.parametrize("form", ["ros1", "foreign-mcap-lz4"])
+def test_a_bag_that_shrinks_while_it_is_walked_is_read_as_a_cut_one(form: str, tmp_path: Path) -> None:
+    """Whoever had mapped it into memory would be ended by the system."""
+    path = FORMS[form](tmp_path, drive(400))
+    found = Salvage(path, BagFormat.ROS1 if form == "ros1" else BagFormat.MCAP)
+    walk = WALKS[found.form](found)
+    first = [next(walk) for _ in range(3)]
+    os.truncate(path, 100)
+    rest = list(walk)
+    assert len(first) + len(rest) < 1200
+    assert "cut short" in found.damage
 
 
 def test_a_database_whose_rows_never_end_is_given_up(tmp_path: Path) -> None:
