@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import copy
 import gzip
+import io
 import json
 import os
 import random
 import re
 import socket
+import sqlite3
 import struct
 import zlib
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import yaml
 
 from pilotage.core.yaml_text import load_yaml
@@ -252,6 +255,28 @@ def zeros_packed(megabytes: int) -> Content:
     return head + packed * megabytes + packer.flush() + struct.pack("<LL", check, size % 2**32)
 
 
+def endless_rows() -> Content:
+    """A bag's and a study's database whose rows come from views that never end."""
+    counting = "with recursive n(i) as (select 1 union all select i + 1 from n) select"
+    with closing(sqlite3.connect(":memory:")) as base:
+        base.executescript(
+            f"""create table topics (id, name, type, serialization_format);
+            insert into topics values (1, '/scan', 'sensor_msgs/msg/LaserScan', 'cdr');
+            create view messages as {counting} 2 as topic_id, i as timestamp, '' as data from n;
+            create view trials as {counting} i as row, 'done' as status from n;
+            create view meta as {counting} i as key, '' as value from n;"""
+        )
+        return base.serialize()
+
+
+def signalling() -> Content:
+    """A NumPy file of numbers of which one is a NaN that processors signal: working with it warns."""
+    values, file = np.zeros((6, 6), np.float32), io.BytesIO()
+    values.view(np.uint32)[2, 3] = 0x7FA00000
+    np.save(file, values)
+    return file.getvalue()
+
+
 WHOLE: dict[str, Content] = {
     "empty": b"",
     "a line end": b"\n",
@@ -284,6 +309,8 @@ WHOLE: dict[str, Content] = {
     "an event without a text": b'{"t_s": 1.0, "kind": 3, "text": null}\n',
     "beyond all doubles": b'{"a": 1e999, "b": 123456789012345678901234567890}',
     "ps": b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 10 10\n",
+    "rows without end": endless_rows(),
+    "a signalling NaN": signalling(),
     "a thousand columns": (",".join(f"c{i}_m" for i in range(1000)) + "\n").encode()
     + (",".join(["1.5"] * 1000) + "\n").encode() * 12,
 }

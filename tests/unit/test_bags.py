@@ -21,6 +21,9 @@ from pilotage.logs.bags import read_bag
 from pilotage.logs.laser_log import LaserLog
 from pilotage.logs.message_types import shared, told_types
 from pilotage.logs.rosbags_extra import rosbags
+from pilotage.logs.salvage.found import BagFormat, Salvage
+from pilotage.logs.salvage.walk import WALKS
+from support.damage import endless_rows
 from support.laser_bags import FORMS, Drive, Scan, drive, with_scan, write_ros1, write_ros2
 
 pytest.importorskip("rosbags")
@@ -109,6 +112,16 @@ def test_ranges_of_three_kinds(tmp_path: Path) -> None:
         "the number of beams changes from scan to scan (10, 21)",
         "1 ranges are not numbers (0.2%): no measurement",
     )
+
+
+def test_a_range_that_signals_is_no_number(tmp_path: Path) -> None:
+    """A NaN of other bits, such as a damaged message may hold: NumPy warns where it is worked with."""
+    mark = np.float32(12345.5)
+    path = write_ros1(tmp_path / "a.bag", with_scan(drive(), 4, ranges_m=np.full(21, mark)))
+    path.write_bytes(path.read_bytes().replace(mark.tobytes(), np.uint32(0x7FA00000).tobytes()))
+    log = read_bag(path)
+    assert np.isnan(log.ranges_m[4]).all()
+    assert log.warnings == ("21 ranges are not numbers (3.3%): no measurement",)
 
 
 def test_times_that_go_back_are_sorted_and_told(tmp_path: Path) -> None:
@@ -336,6 +349,25 @@ def test_a_description_of_far_too_much_is_not_handed_to_the_library(
     handed = "rosbags.highlevel.AnyReader.__init__"
     monkeypatch.setattr(handed, lambda *_, **__: pytest.fail("it was handed over"))
     assert len(read_bag(path)) == 30
+
+
+@pytest.mark.parametrize("form", ["ros1", "foreign-mcap-lz4"])
+def test_a_bag_that_shrinks_while_it_is_walked_is_read_as_a_cut_one(form: str, tmp_path: Path) -> None:
+    """Whoever had mapped it into memory would be ended by the system."""
+    path = FORMS[form](tmp_path, drive(400))
+    found = Salvage(path, BagFormat.ROS1 if form == "ros1" else BagFormat.MCAP)
+    walk = WALKS[found.form](found)
+    first = [next(walk) for _ in range(3)]
+    os.truncate(path, 100)
+    rest = list(walk)
+    assert len(first) + len(rest) < 1200
+    assert "cut short" in found.damage
+
+
+def test_a_database_whose_rows_never_end_is_given_up(tmp_path: Path) -> None:
+    (tmp_path / "a.db3").write_bytes(endless_rows())
+    with pytest.raises(InputError, match="rows without end"):
+        read_bag(tmp_path / "a.db3")
 
 
 def test_a_cut_bag_of_packed_messages(tmp_path: Path) -> None:

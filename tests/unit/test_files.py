@@ -19,6 +19,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
+from scipy.io import savemat
 
 from pilotage.core import limits
 from pilotage.core.errors import InputError
@@ -29,6 +30,7 @@ from pilotage.core.files.parquet import arrow_table, read_parquet
 from pilotage.core.json_text import load_json
 from pilotage.core.shown import LONGEST_TEXT, shown, visible
 from pilotage.core.yaml_text import load_yaml
+from pilotage.logs.mat import load_mat
 
 READERS = (read_bytes, read_text, read_yaml, read_json, require_file, map_npy, read_npz, read_parquet)
 
@@ -262,6 +264,22 @@ def test_an_array_outlives_its_file(tmp_path: Path) -> None:
     assert values.sum() == 20_000 * 19_999 / 2
     with pytest.raises(InputError, match="cut short"):
         read_npy(tmp_path / "a.npy")
+
+
+def test_a_nan_that_signals_is_one_as_all(tmp_path: Path) -> None:
+    """Bytes of something else may be one, and working with it warns, which is an error here."""
+    odd = np.arange(6, dtype=np.float32)
+    odd.view(np.uint32)[2] = 0x7FA00000
+    np.save(tmp_path / "a.npy", odd)
+    np.savez(tmp_path / "a.npz", odd=odd)
+    pq.write_table(pa.table({"odd": odd}), tmp_path / "a.parquet")
+    found = [read_npy(tmp_path / "a.npy"), read_npz(tmp_path / "a.npz")["odd"]]
+    found.append(read_parquet(tmp_path / "a.parquet")["odd"])
+    for level in ("4", "5"):
+        savemat(tmp_path / "a.mat", {"odd": odd}, format=level)
+        found.append(load_mat(tmp_path / "a.mat", ["odd"])["odd"].ravel())
+    for values in found:
+        assert np.isnan(np.diff(values.astype(np.float64))).tolist() == [False, True, True, False, False]
 
 
 def test_a_library_in_c_says_nothing_of_a_damaged_picture(

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from pilotage.core.errors import InputError
+from pilotage.core.files.arrays import quiet
 from pilotage.core.types import FloatArray
 from pilotage.logs.bag_messages import OpenBag, read_through
 from pilotage.logs.bag_topics import Kind, holds, pick, sorted_out
@@ -159,7 +160,7 @@ def _add_scan(found: _Collected, message: Any, time_ns: int) -> None:
     found.scans.append(
         RawScan(
             _stamp_s(found, message.header, time_ns),
-            np.asarray(message.ranges, dtype=np.float64),
+            quiet(np.asarray(message.ranges)).astype(np.float64),
             float(message.angle_min),
             float(message.angle_increment),
             float(message.range_min),

@@ -20,6 +20,7 @@ import numpy as np
 
 from pilotage.core.errors import InputError
 from pilotage.core.files import read_bytes
+from pilotage.core.files.arrays import quiet
 from pilotage.core.limits import DATA_BYTES, limit, too_large
 
 HEADER_BYTES = 128
@@ -137,7 +138,8 @@ def _keep(found: dict[str, Any], path: Path, body: bytes, order: str, names: Seq
     if flag & _COMPLEX:
         values = values + 1j * _numbers(path, next(parts, None), order, count, word, at)
     else:
-        values = values.astype(_CLASSES[kind])
+        with np.errstate(over="ignore", invalid="ignore"):  # what its class cannot hold is found by who asks
+            values = values.astype(_CLASSES[kind])
     found[word] = values.reshape(shape, order="F")
 
 
@@ -151,7 +153,7 @@ def _numbers(
         raise InputError(
             f"{path} byte {at}: {name}: expected {count} numbers, found {len(body)} bytes of type {kind}"
         )
-    return np.frombuffer(body, order + _TYPES[kind])
+    return quiet(np.frombuffer(body, order + _TYPES[kind]))
 
 
 def _level_4(path: Path, data: bytes, names: Sequence[str]) -> dict[str, Any]:
@@ -168,7 +170,8 @@ def _level_4(path: Path, data: bytes, names: Sequence[str]) -> dict[str, Any]:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")  # it warns of what it is about to read wrongly
-            return dict(loadmat(source, variable_names=list(names)))
+            found = loadmat(source, variable_names=list(names))
     except (*broken, OverflowError, MemoryError, NotImplementedError, Warning) as error:
         said = " ".join(str(error).split())
         raise InputError(f"{path}: expected a MATLAB file with {wanted}, found: {said}") from None
+    return {name: quiet(value) if isinstance(value, np.ndarray) else value for name, value in found.items()}

@@ -11,6 +11,7 @@ import numpy as np
 from pilotage.core.errors import InputError
 from pilotage.core.extras import missing
 from pilotage.core.files import read_bytes, read_json, require_file
+from pilotage.core.files.arrays import quiet
 from pilotage.core.limits import DATA_BYTES, limit, too_large
 from pilotage.core.types import Pose2
 from pilotage.maps.ascii_grid import read_ascii_grid
@@ -56,7 +57,8 @@ def read_elevation(
         in the unit of its cells; for a GeoTIFF also where rasterio is not installed.
     """
     require_file(path, "an elevation model")
-    model = _read(path, origin, resolution_m)
+    with np.errstate(over="ignore", invalid="ignore"):  # what becomes infinite is refused
+        model = _read(path, origin, resolution_m)
     rows, columns = model.elevation_m.shape
     low, high = (float(pick.reduce(model.elevation_m, axis=None)) for pick in (np.fmin, np.fmax))
     if high - low > STEEPEST * model.resolution_m * math.hypot(rows, columns):
@@ -92,8 +94,7 @@ def _read_npy(path: Path, resolution_m: float | None, origin: Pose2) -> Elevatio
     if heights.dtype.kind not in "iuf":
         raise InputError(f"elevation '{path}': expected heights as numbers, found {heights.dtype}")
     require_memory(12 * heights.size, f"elevation '{path}'")
-    with np.errstate(over="ignore"):  # what becomes infinite is refused
-        return ElevationModel(heights.astype(np.float32), resolution_m, origin)
+    return ElevationModel(heights.astype(np.float32), resolution_m, origin)
 
 
 def _read_raw(path: Path, origin: Pose2) -> ElevationModel:
@@ -126,7 +127,7 @@ def _read_raw(path: Path, origin: Pose2) -> ElevationModel:
             f"{raw}: expected {rows * columns * dtype.itemsize} bytes for {columns} x {rows} values, "
             f"found {held}; the file seems to be cut short or of another size"
         )
-    heights = np.frombuffer(data, dtype=dtype).reshape(rows, columns).astype(np.float32)
+    heights = quiet(np.frombuffer(data, dtype=dtype).reshape(rows, columns)).astype(np.float32)
     if "elevationMin" in side or "elevationMax" in side:
         low, high = _number(side, "elevationMin", path), _number(side, "elevationMax", path)
         whole = np.iinfo(dtype).max if dtype.kind in "iu" else 1.0
@@ -197,7 +198,7 @@ def _read_geotiff(path: Path, origin: Pose2 | None) -> ElevationModel:
         raise InputError(
             f"elevation '{path}': expected metres, found {crs.linear_units}; project it (gdalwarp)"
         )
-    heights = np.asarray(band.filled(np.nan), dtype=np.float32)
+    heights = quiet(np.asarray(band.filled(np.nan), dtype=np.float32))
     if upside_down:
         heights = heights[::-1]
     return _squared(heights, row_m, column_m, corner if origin is None else origin)

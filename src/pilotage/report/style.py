@@ -10,7 +10,7 @@ import io
 import math
 import re
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from copy import copy
 from dataclasses import dataclass
@@ -25,6 +25,7 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Outline
+from matplotlib.text import Text
 from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import Bbox, Transform
 
@@ -243,11 +244,8 @@ _FONT = re.compile(r"font: (?:(\w+) )?([\d.]+)px [^;\"]*")
 _FAMILY = re.compile(r"font-family: [^;\"]*;? ?")
 _GROUP_ID = re.compile(r" id=\"(?!layer-)[A-Za-z.]+\w*_\d+\"")
 _LAYER_ID = re.compile(r" id=\"layer-([a-z0-9-]+)\"")
-_ANY_ID = re.compile(r" id=\"([^\"]+)\"")
-_USE = re.compile(r"(?:xlink:)?href=\"#([^\"]+)\"")
-_URL = re.compile(r"url\(#([^)]+)\)")
 _OUTLINE = re.compile(r" d=\"([^\"]*)\"")
-_LONG_NUMBER = re.compile(r"(\.\d\d)\d+")
+_TOO_FINE = re.compile(r"(?<=\.\d\d)\d+")
 _LONG_PLACE = re.compile(r"( (?:x|y)=\"-?\d+\.\d\d)\d+\"")
 _NO_TURN = re.compile(r" transform=\"rotate\(-?0 [^)]*\)\"")
 _BETWEEN = re.compile(r">\s+<")
@@ -272,11 +270,15 @@ def render(figure: Figure, slug: str, alt: str) -> str:
     svg = _FAMILY.sub("", _FONT.sub(_font_size, svg))
     # Several artists may make up one layer, and an identifier may be there but once.
     svg = _LAYER_ID.sub(r' class="layer-\1"', _GROUP_ID.sub("", svg))
-    svg = _ANY_ID.sub(rf' id="{slug}-\1"', svg)
-    svg = _URL.sub(rf"url(#{slug}-\1)", _USE.sub(rf'href="#{slug}-\1"', svg))
+    svg = svg.replace(' id="', f' id="{slug}-').replace("url(#", f"url(#{slug}-")
+    svg = svg.replace('xlink:href="#', 'href="#').replace('href="#', f'href="#{slug}-')
     svg = _ROOT.sub(rf'<svg viewBox="\1" role="img" aria-label="{_attribute(alt)}">', svg, count=1)
     return _BETWEEN.sub("><", svg).strip()
 
+
+MOST_LAYOUTS = 2000
+_LAYOUTS: dict[tuple[object, ...], Any] = {}
+"""Of numbers at axes, by what they say and how they are written."""
 
 _PLAIN = 1e-3, 9e5
 """Largest numbers of an axis that is labelled without a power of ten above it (``axes.formatter.limits``)."""
@@ -304,6 +306,7 @@ def _let_ticks_be_as_told(figure: Figure) -> None:
     for axes in figure.axes:
         for axis in (axes.xaxis, axes.yaxis):
             for tick in axis.majorTicks:
+                _lay_out_once(tick.label1)
                 if tick.get_tick_padding() == 0.0:  # it has no length
                     tick.tick1line.set_visible(False)
             vars(axis)["_get_tick"] = partial(_tick_of, axis)
@@ -330,7 +333,33 @@ def _tick_of(axis: Any, major: bool) -> Tick:
         if part.get_visible():
             name = next(name for name, value in vars(made).items() if value is part)
             setattr(made, name, copy(part))
+    _lay_out_once(made.label1)
     return made
+
+
+def _lay_out_once(label: Text) -> None:
+    """Where a number's box lies is asked to place its axis's words, and once more to draw it.
+
+    The same numbers stand at most axes of a page.
+    """
+    lay_out: Callable[..., Any] | None = getattr(type(label), "_get_layout", None)
+    if lay_out is None:
+        return
+
+    def layout(renderer: object) -> Any:
+        figure = label.get_figure()
+        told = (
+            *(label.get_text(), label.get_fontproperties(), label.get_rotation(), label.get_rotation_mode()),
+            *(label.get_horizontalalignment(), label.get_verticalalignment(), figure and figure.dpi),
+        )
+        found = _LAYOUTS.get(told)
+        if found is None:
+            if len(_LAYOUTS) >= MOST_LAYOUTS:
+                _LAYOUTS.clear()
+            found = _LAYOUTS[told] = lay_out(label, renderer)
+        return found
+
+    vars(label)["_get_layout"] = layout
 
 
 def _clip_alike(first: Tick, made: Tick) -> None:
@@ -341,7 +370,7 @@ def _clip_alike(first: Tick, made: Tick) -> None:
 
 
 def _short_outline(match: re.Match[str]) -> str:
-    numbers = _LONG_NUMBER.sub(r"\1", match.group(1))
+    numbers = _TOO_FINE.sub("", match.group(1))
     return f' d="{numbers.replace(chr(10), "").replace(" L ", "L").replace(" z", "z").strip()}"'
 
 

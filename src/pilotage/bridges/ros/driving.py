@@ -12,6 +12,7 @@ from pilotage.bridges.ros import messages as ros
 from pilotage.bridges.ros.node import FLUSH_S, ros_node
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.errors import InputError
+from pilotage.core.files.arrays import quiet
 from pilotage.core.types import STOP, FloatArray, Pose2, Twist
 from pilotage.experiments.build.build import build
 from pilotage.missions.mission import Mission
@@ -160,7 +161,7 @@ def _ranges(message: Any, sheet: LidarConfig) -> FloatArray:
     reach says so for the data sheet's. NaN, and the zero that many drivers write for it, is no measurement,
     as are directions that no beam looks to: the ground there is not known to be free.
     """
-    told = np.asarray(message.ranges, dtype=np.float64)
+    told = quiet(np.asarray(message.ranges)).astype(np.float64)
     least = max(message.range_min, 0.0)
     farthest = message.range_max if message.range_max > least else np.inf  # some drivers leave it at zero
     too_near = np.isneginf(told) | ((told > 0.0) & (told < least))

@@ -112,7 +112,7 @@ def _array(file: IO[bytes], size: int, where: str) -> Array:
     if len(data) < count * dtype.itemsize:
         raise _cut(where, shape, dtype)
     file.read()  # to the member's end, where its checksum is compared
-    return np.frombuffer(data, dtype).reshape(shape, order="F" if fortran else "C")
+    return quiet(np.frombuffer(data, dtype).reshape(shape, order="F" if fortran else "C"))
 
 
 def _header(file: IO[bytes], where: str) -> tuple[tuple[int, ...], np.dtype[Any], bool]:
@@ -149,6 +149,15 @@ def _cut(where: str, shape: tuple[int, ...], dtype: np.dtype[Any]) -> InputError
     return InputError(
         f"{where}: expected {dtype} of shape {shape}, found less; the file seems to be cut short"
     )
+
+
+def quiet(values: Array) -> Array:
+    """The same with the usual NaN for each: of a signalling one NumPy warns wherever it is worked with.
+
+    No program writes such; other bytes read as numbers hold some.
+    """
+    gaps = np.isnan(values) if values.dtype.kind == "f" else np.zeros(0, np.bool_)
+    return np.where(gaps, values.dtype.type(np.nan), values) if gaps.any() else values
 
 
 def require_numbers(values: Array, most: float, where: str) -> Array:

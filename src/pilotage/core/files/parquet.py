@@ -10,10 +10,9 @@ from typing import Any
 import numpy as np
 
 from pilotage.core.errors import InputError
+from pilotage.core.files.arrays import Array, quiet
 from pilotage.core.files.plain import read_bytes
 from pilotage.core.limits import DATA_BYTES, MB, limit, too_large
-
-Array = np.ndarray[tuple[int, ...], np.dtype[Any]]
 
 _BYTES_A_VALUE = 8
 _HEADER_BYTES = 16 * MB
@@ -181,4 +180,4 @@ def _numbers(column: Any) -> Array:
         for chunk in column.chunks
         if len(chunk)
     ]
-    return np.concatenate(parts) if parts else np.empty(0, dtype)
+    return quiet(np.concatenate(parts)) if parts else np.empty(0, dtype)

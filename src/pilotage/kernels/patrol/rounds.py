@@ -70,6 +70,37 @@ def judge_walk(order: IntArray, size: int, ground: Ground, worst: FloatArray, me
 
 
 @kernel
+def by_phase(stops: IntArray, at: FloatArray, period: float) -> tuple[FloatArray, IntArray]:
+    """Distances (K,) beyond the last multiple of a period, in ascending order, and the stops (K,) there.
+
+    Distances ascend already, so in each period they are in order: one period after the other is merged in.
+    """
+    count = stops.shape[0]
+    phase, ordered = np.empty(count), np.empty(count, np.int64)
+    add_phase, add = np.empty(count), np.empty(count, np.int64)
+    end = 0
+    while end < count:
+        i, number = end - 1, 0
+        while end < count:
+            beyond = at[end] if at[end] < period else at[end] % period
+            if number > 0 and beyond < add_phase[number - 1]:
+                break
+            add_phase[number], add[number] = beyond, stops[end]
+            number += 1
+            end += 1
+        k = end
+        while number > 0:
+            k -= 1
+            if i >= 0 and phase[i] > add_phase[number - 1]:
+                phase[k], ordered[k] = phase[i], ordered[i]
+                i -= 1
+            else:
+                number -= 1
+                phase[k], ordered[k] = add_phase[number], add[number]
+    return phase, ordered
+
+
+@kernel
 def visit_gaps(
     stops: IntArray, at: FloatArray, length: float, size: int, worst: FloatArray, mean: FloatArray
 ) -> None:
@@ -84,14 +115,12 @@ def visit_gaps(
         worst[stops[0]] = mean[stops[0]] = 0.0
         return
     period = length / size
-    phase = at
-    by_phase: IntArray = np.arange(stops.shape[0])
+    phase, passed = at, stops
     if size > 1:
-        phase = np.mod(at, period)
-        by_phase = np.argsort(phase)
+        phase, passed = by_phase(stops, at, period)
     first, last = np.full(worst.shape[0], -1.0), np.empty(worst.shape[0])
-    for k in by_phase:
-        vertex = stops[k]
+    for k in range(stops.shape[0]):
+        vertex = passed[k]
         if first[vertex] < 0.0:
             first[vertex], worst[vertex], mean[vertex] = phase[k], 0.0, 0.0
         else:

@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
-import mmap
 from collections.abc import Iterator
 
 from pilotage.core.files import opened
 from pilotage.logs.salvage.found import MAGIC_OF, BagFormat, Raw, Salvage, damage_of
-from pilotage.logs.salvage.pieces import CutError, string, uint, unpack
+from pilotage.logs.salvage.pieces import CutError, FileBytes, string, uint, unpack
 
 _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _DATA_END = 3, 4, 5, 6, 15
 
 
 def walk_mcap(found: Salvage) -> Iterator[Raw]:
     """Yield the messages of an MCAP file; ``found`` learns on the way."""
-    with opened(found.path, "a bag") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+    with opened(found.path, "a bag") as file:
+        data = FileBytes(file)
         schemas: dict[int, tuple[str, str]] = {}
         channels: dict[int, str] = {}
         place, damaged, closed = len(MAGIC_OF[BagFormat.MCAP]), 0, False
         while place + 9 <= len(data) and not closed:
-            op, size = data[place], uint(data, place + 1, 8)
-            end = place + 9 + size
+            head = data[place : place + 9]
+            if len(head) < 9:  # the file has shrunk meanwhile
+                break
+            op, end = head[0], place + 9 + uint(head, 1, 8)
             body = data[place + 9 : min(end, len(data))]
             closed = op == _DATA_END  # what follows repeats what was there
             try:

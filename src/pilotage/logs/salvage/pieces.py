@@ -4,11 +4,31 @@ from __future__ import annotations
 
 import bz2
 import importlib
-from typing import Any
+import os
+from typing import IO, Any
 
 
 class CutError(Exception):
     """The bytes end before the record does."""
+
+
+class FileBytes:
+    """A file's bytes by their places, read when they are asked for.
+
+    A map of the file into memory would end the process where the file shrinks meanwhile; here what is gone
+    is missing, as in a file that is cut.
+    """
+
+    def __init__(self, file: IO[bytes]) -> None:
+        self._file, self._size = file, os.fstat(file.fileno()).st_size
+
+    def __len__(self) -> int:
+        return self._size
+
+    def __getitem__(self, places: slice) -> bytes:
+        first, end, _ = places.indices(self._size)
+        self._file.seek(first)
+        return self._file.read(max(0, end - first))
 
 
 def unpack(data: bytes, compression: str) -> tuple[bytes, bool]:

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import mmap
 import struct
 from collections.abc import Iterator
 from typing import Any
 
 from pilotage.core.files import opened
 from pilotage.logs.salvage.found import MAGIC_OF, BagFormat, Raw, Salvage, damage_of
-from pilotage.logs.salvage.pieces import CutError, uint, unpack
+from pilotage.logs.salvage.pieces import CutError, FileBytes, uint, unpack
 
 
 def walk_ros1(found: Salvage) -> Iterator[Raw]:
     """Yield the messages of a ROS 1 bag; ``found`` learns on the way."""
-    with opened(found.path, "a bag") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+    with opened(found.path, "a bag") as file:
+        data = FileBytes(file)
         names: dict[int, str] = {}
         place, damaged = len(MAGIC_OF[BagFormat.ROS1]), 0
         closed = False

@@ -8,6 +8,11 @@ from collections.abc import Iterator
 from pilotage.core.files import read_bytes
 from pilotage.logs.salvage.found import Raw, Salvage, damage_of
 
+STEPS = 100_000
+"""Of SQLite's machine between two looks at how many it has taken."""
+MOST_A_BYTE = 10
+"""Such steps for each byte of the file: a row takes a dozen of them, and ten bytes at least."""
+
 
 def walk_sqlite(found: Salvage) -> Iterator[Raw]:
     """Yield the messages of rosbag2's SQLite storage; ``found`` learns on the way."""
@@ -22,7 +27,8 @@ def walk_sqlite(found: Salvage) -> Iterator[Raw]:
             if all(row == rows[0] for row in rows):
                 yield rows[0]
     except (sqlite3.Error, ValueError, TypeError, OverflowError) as error:
-        cut = cut or f"the file is damaged ({error})"
+        endless = getattr(error, "sqlite_errorcode", None) == sqlite3.SQLITE_INTERRUPT
+        cut = cut or f"the file is damaged ({'rows without end' if endless else error})"
     found.damage = damage_of(found.path, 0, cut)
 
 
@@ -37,7 +43,16 @@ def _missing(data: bytes) -> int:
 
 def _sqlite_rows(data: bytes, found: Salvage) -> Iterator[Raw]:
     base = sqlite3.connect(":memory:")
+    left = 10 + MOST_A_BYTE * len(data) // STEPS
+
+    def has_too_much() -> bool:
+        """Whether there is more to read than a file of this size holds: a view can have rows without end."""
+        nonlocal left
+        left -= 1
+        return left < 0
+
     try:
+        base.set_progress_handler(has_too_much, STEPS)
         base.deserialize(data)
         # Without this, a file shorter than its header says is refused as a whole.
         base.execute("PRAGMA writable_schema=ON")
