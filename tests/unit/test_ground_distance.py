@@ -175,5 +175,5 @@ def test_walls_too_far_apart_for_fine_nodes_have_coarser_ones(monkeypatch: pytes
     coarse = DistanceField.from_map(walls)
     assert (fine.resolution_m, coarse.resolution_m) == (0.1, 0.2)
     np.testing.assert_allclose(coarse.distance_m, fine.distance_m[::2, ::2], atol=1e-9)
-    with pytest.raises(InputError, match="coarser than 0.1 m"):
+    with pytest.raises(InputError, match=r"coarser than 0\.1 m"):
         DistanceField.from_map(walls, 0.1)
