@@ -122,7 +122,7 @@ class Factor(Config):
         for name in levels if isinstance(levels, Mapping) else ():
             if not isinstance(name, str):
                 raise ValueError(
-                    f"expected names in quotes, for YAML reads on, off, 1 as no text, found {name}"
+                    f"expected names in quotes, for YAML reads 1 as no text, found {name}"
                 )
         return levels
 
