@@ -10,10 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from pilotage.core.errors import InputError
 from pilotage.core.types import Goal, Pose2
 from pilotage.kernels.geometry import plane
 from pilotage.kernels.rrt.clearance import slack_at
-from pilotage.maps import ground_distance
+from pilotage.maps import distance_field, ground_distance
 from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.floor import Floor
 from pilotage.maps.ground_distance import with_circles
@@ -164,3 +165,15 @@ def test_a_map_too_large_for_fine_nodes_has_coarser_ones(monkeypatch: pytest.Mon
     coarse = coarse_chart().field
     assert (fine.resolution_m, coarse.resolution_m) == (0.1, 0.2)
     np.testing.assert_allclose(coarse.distance_m, fine.distance_m[::2, ::2], atol=1e-9)
+
+
+def test_walls_too_far_apart_for_fine_nodes_have_coarser_ones(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A hall of 1 km was refused: 'take a resolution coarser than 0.1 m', which nobody could say."""
+    walls = SegmentMap.of(np.array([[0.0, 0.0, 8.0, 0.0], [8.0, 0.0, 8.0, 4.0]]), np.zeros((0, 3)))
+    fine = DistanceField.from_map(walls)
+    monkeypatch.setattr(distance_field, "MAX_NODES", 1_000)
+    coarse = DistanceField.from_map(walls)
+    assert (fine.resolution_m, coarse.resolution_m) == (0.1, 0.2)
+    np.testing.assert_allclose(coarse.distance_m, fine.distance_m[::2, ::2], atol=1e-9)
+    with pytest.raises(InputError, match=r"coarser than 0\.1 m"):
+        DistanceField.from_map(walls, 0.1)

@@ -113,7 +113,7 @@ def test_a_wrong_study_file_is_one_line(
         ([{"key": "world.goal", "values": [1], "multiply": True}], "a number in the mission to multiply"),
         ([{"key": "run.seed", "values": [1]}], "the trials take their seeds"),
         ([{"key": RADIUS, "values": [-1]}], "cell 'turning_radius_m=-1'"),
-        ([{"name": "x", "levels": {False: {}, True: {}}}], "expected names in quotes"),
+        ([{"name": "x", "levels": {1: {}, 2: {}}}], "expected names in quotes"),
         ({"key": RADIUS}, "factors"),
     ],
 )

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pilotage.core.angles import wrap_to_pi
 from pilotage.core.errors import InputError
 from pilotage.core.random import RandomStreams
 from pilotage.core.types import FloatArray, Pose2
@@ -126,7 +127,7 @@ def test_views_that_meet_go_all_around(lasers: int, short_rad: float, turned_rad
         f"laser{k}": LidarConfig(
             beams=180,
             field_of_view_rad=view_rad,
-            mount=Mount(x_m=0.1 * k, theta_rad=turned_rad + 2.0 * math.pi * k / lasers),
+            mount=Mount(x_m=0.1 * k, theta_rad=wrap_to_pi(turned_rad + 2.0 * math.pi * k / lasers)),
         )
         for k in range(lasers)
     }

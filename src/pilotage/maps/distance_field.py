@@ -18,6 +18,18 @@ MAX_NODES = 50_000_000
 """Beyond this a field would need more than 400 MB."""
 
 
+SPACING_M = 0.1
+
+
+def _spacing_m(bounds_m: tuple[float, float, float, float]) -> float:
+    """How far apart the nodes of a map are that nobody asks to be finer or coarser."""
+    xmin, ymin, xmax, ymax = bounds_m
+    spacing_m = SPACING_M
+    while math.ceil((xmax - xmin) / spacing_m + 1) * math.ceil((ymax - ymin) / spacing_m + 1) > MAX_NODES:
+        spacing_m *= 2.0
+    return spacing_m
+
+
 @dataclass(frozen=True, slots=True)
 class DistanceField:
     """Distances at the nodes of a square grid; between nodes they are interpolated bilinearly.
@@ -42,11 +54,14 @@ class DistanceField:
     circles_m: FloatArray
 
     @staticmethod
-    def from_map(world: SegmentMap, resolution_m: float = 0.1) -> DistanceField:
+    def from_map(world: SegmentMap, resolution_m: float | None = None) -> DistanceField:
         """Sample the exact distance of a segment map; the bounds' edge is no obstacle by itself.
 
+        Without a resolution the nodes lie 0.1 m apart, on a map too large for that as near as they fit.
         A map without walls and discs is as far from obstacles as it is wide, as an empty grid is.
         """
+        if resolution_m is None:
+            resolution_m = _spacing_m(world.bounds_m)
         if not resolution_m > 0.0:
             raise InputError(f"distance field: expected a resolution above 0 m, found {resolution_m}")
         xmin, ymin, xmax, ymax = world.bounds_m

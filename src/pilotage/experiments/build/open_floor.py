@@ -192,4 +192,4 @@ def room_m(chart: WorldMap, x_m: float, y_m: float, asked_m: float) -> float:
 
 def _finer_field(chart: WorldMap) -> DistanceField:
     """Distances to walls, nearer to each other than on the map's own field."""
-    return _FIELDS.get(chart, GRID_M, lambda: DistanceField.from_map(chart.walls, GRID_M))
+    return _FIELDS.get(chart, GRID_M, lambda: DistanceField.from_map(chart.walls))

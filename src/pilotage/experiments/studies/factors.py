@@ -121,9 +121,7 @@ class Factor(Config):
     def _named(cls, levels: Any) -> Any:
         for name in levels if isinstance(levels, Mapping) else ():
             if not isinstance(name, str):
-                raise ValueError(
-                    f"expected names in quotes, for YAML reads on, off, 1 as no text, found {name}"
-                )
+                raise ValueError(f"expected names in quotes, for YAML reads 1 as no text, found {name}")
         return levels
 
     @model_validator(mode="after")
