@@ -256,6 +256,14 @@ def test_an_archive_is_packed_as_numpy_packs(tmp_path: Path) -> None:
         read_npz(path)
 
 
+def test_lines_beyond_a_limit_are_not_read(tmp_path: Path) -> None:
+    path = tmp_path / "a.jsonl"
+    path.write_text('{"a": 1}\n' * 3)
+    assert len(read_json_lines(path, most=3)) == 3
+    with pytest.raises(InputError, match="at most 2 lines, found more"):
+        read_json_lines(path, most=2)
+
+
 def test_an_array_outlives_its_file(tmp_path: Path) -> None:
     """A map into a file that is cut short meanwhile would end the process."""
     np.save(tmp_path / "a.npy", np.arange(20_000.0))

@@ -15,6 +15,8 @@ from pilotage.core.errors import InputError
 from pilotage.core.types import Event
 from pilotage.records.run_data import read_run
 from pilotage.report import write_report
+from pilotage.report.figures.timeline import timeline_figure
+from pilotage.report.style import drawing_style
 from support.fabricated_run import (
     fabricate_columns,
     fabricate_metrics,
@@ -178,6 +180,13 @@ def test_many_sensors_and_many_events(tmp_path: Path) -> None:
     events = [{"t_s": 0.1 * i, "kind": "avoid-start", "text": f"number {i}"} for i in range(300)]
     page = page_of(fabricate_run(tmp_path / "run", steps=300, columns=columns, events=events))
     assert "number 299" in page
+
+
+def test_lines_that_nobody_could_tell_apart_are_drawn_once(tmp_path: Path) -> None:
+    events = [{"t_s": 0.1 + 1e-6 * i, "kind": "avoid-start", "text": "again"} for i in range(2000)]
+    run = read_run(fabricate_run(tmp_path / "run", events=events))
+    with drawing_style():
+        assert len(timeline_figure(run).svg) < 30_000
 
 
 def test_long_run_stays_small_and_keeps_its_peak(tmp_path: Path) -> None:

@@ -16,6 +16,8 @@ from pilotage.records.numbers import number
 from pilotage.records.reading import clean_text, is_there
 
 EVENTS_FILE = "events.jsonl"
+MOST_EVENTS = 20_000
+"""Each is a row of the page; hours of a team leave some hundreds."""
 LATEST_S = 2**31 - 1
 """What a stamp of ROS holds, 1 and 2."""
 
@@ -36,12 +38,13 @@ def read_events(folder: Path) -> tuple[Event, ...]:
     Raises
     ------
     InputError
-        One line, where a line is no object with t_s, kind and text.
+        One line, where a line is no object with t_s, kind and text, or there are more than ``MOST_EVENTS``.
     """
     path = folder / EVENTS_FILE
     if not is_there(path):
         return ()
-    return tuple(_event(entry, path) for entry in read_json_lines(path, "a run's events"))
+    entries = read_json_lines(path, "a run's events", MOST_EVENTS)
+    return tuple(_event(entry, path) for entry in entries)
 
 
 def _event(entry: Mapping[str, Any], path: Path) -> Event:

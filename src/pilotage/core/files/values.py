@@ -8,7 +8,7 @@ from typing import Any
 from pilotage.core.errors import InputError
 from pilotage.core.files.plain import decoded, read_bytes
 from pilotage.core.json_text import load_json
-from pilotage.core.limits import VALUES_BYTES
+from pilotage.core.limits import VALUES, VALUES_BYTES, limit, too_large
 from pilotage.core.yaml_text import load_yaml
 
 
@@ -22,15 +22,23 @@ def read_json(path: Path, what: str = "a JSON file") -> Any:
     return load_json(read_values_text(path, what), str(path))
 
 
-def read_json_lines(path: Path, what: str = "a file with one JSON object a line") -> list[dict[str, Any]]:
+def read_json_lines(
+    path: Path, what: str = "a file with one JSON object a line", most: int = VALUES
+) -> list[dict[str, Any]]:
     """Read a file of JSON objects, one a line; empty lines are passed over.
+
+    Parameters
+    ----------
+    most
+        Objects, before the user's setting.
 
     Raises
     ------
     InputError
-        File and line of what is no object; else as ``read_text``.
+        File and line of what is no object, or of one too many; else as ``read_text``.
     """
-    objects = []
+    most = limit(most)
+    objects: list[dict[str, Any]] = []
     for number, line in enumerate(read_values_text(path, what).split("\n"), start=1):
         if not line.strip():
             continue
@@ -38,6 +46,8 @@ def read_json_lines(path: Path, what: str = "a file with one JSON object a line"
         value = load_json(line, where)
         if not isinstance(value, dict):
             raise InputError(f"{where}: expected a JSON object, found {type(value).__name__}")
+        if len(objects) == most:
+            raise too_large(str(path), most, None, "lines")
         objects.append(value)
     return objects
 

@@ -31,6 +31,7 @@ TITLE = "What happened and when"
 MOST_ROWS = 6
 _ROW_PT = 2.0 * RADIUS_PT + 3.0
 _MODE_PT = 13.0
+_WIDTH_PT, _NARROW_PT = 660.0, 0.2
 
 
 def timeline_figure(run: RunData) -> Illustration:
@@ -77,7 +78,7 @@ def _badge_rows(run: RunData) -> list[int]:
     """Give each event a row such that badges do not touch; -1 where there is no row left."""
     t_s = run.trace.t_s
     span_s = max(float(t_s[-1] - t_s[0]), 1e-9) if len(t_s) > 1 else 1.0
-    needed_s = span_s * (2.0 * RADIUS_PT + 3.0) / 660.0
+    needed_s = span_s * (2.0 * RADIUS_PT + 3.0) / _WIDTH_PT
     free_from = [-np.inf] * MOST_ROWS
     rows = []
     for event in run.events:
@@ -96,11 +97,17 @@ def _events(axes: Axes, below: Axes, run: RunData, rows: list[int]) -> None:
     axes.spines[["left", "bottom"]].set_visible(False)
     if not run.events:
         note(axes, "nothing out of the ordinary")
+    # Of lines that nobody could tell apart one is drawn: a run may have thousands of events.
+    narrow_s = max(float(np.ptp(run.trace.t_s)), 1e-9) * _NARROW_PT / _WIDTH_PT
+    drawn: set[tuple[str, int]] = set()
     for index, (event, row) in enumerate(zip(run.events, rows, strict=True), start=1):
         colour = event_kind(event.kind).colour
         if not np.isfinite(event.t_s):
             continue
-        below.axvline(event.t_s, color=colour, linewidth=0.6, alpha=0.7)
+        place = colour, round(min(max(event.t_s / narrow_s, -1e9), 1e9))
+        if place not in drawn:
+            drawn.add(place)
+            below.axvline(event.t_s, color=colour, linewidth=0.6, alpha=0.7)
         if row >= 0:
             badge(axes, event.t_s, row + 0.5, str(index), colour)
 
