@@ -102,18 +102,20 @@ def pair_poses(
 
 @kernel
 def scan_fit(
-    expected: Expected, x: float, y: float, heading: float, ranges: FloatArray, stride: int
+    expected: Expected, x: float, y: float, heading: float, ranges: FloatArray, stride: int, extra: float
 ) -> tuple[float, float]:
     """Shares of every ``stride``-th beam that the map explains, and that it contradicts, from a pose.
 
-    ``heading`` is the first beam's. Explained: within ``near`` of the map's range. Contradicted: longer than
-    the map's by more than ``beyond``, through what the map says is a wall; a shorter one may be something
-    unexpected. Beams of which nothing is known, NaN, do not count; a scan of none but these is explained. Of
-    a scan that several scanners took a beam ends where one of them saw something, which a wall between may
-    hide from the pose itself: what one of them can have seen is not contradicted.
+    ``heading`` is the first beam's; ``extra`` widens both tolerances. Explained: within ``near`` of the map's
+    range. Contradicted: longer than the map's by more than ``beyond``, through what the map says is a wall; a
+    shorter one may be something unexpected. Beams of which nothing is known, NaN, do not count; a scan of
+    none but these is explained. Of a scan that several scanners took a beam ends where one of them saw
+    something, which a wall between may hide from the pose itself: what one of them can have seen is not
+    contradicted.
     """
     beams = (ranges.shape[0] + stride - 1) // stride
     step, most = expected.step * stride, expected.max_range
+    near, beyond = expected.near + extra, expected.beyond + extra
     met = fan_ranges(x, y, heading, step, beams, most, expected.segments, expected.circles)
     explained = contradicted = known = 0
     for k in range(beams):
@@ -121,10 +123,11 @@ def scan_fit(
             continue
         known += 1
         measured = min(ranges[k * stride], most)
-        if abs(measured - met[k]) <= expected.near:
+        if abs(measured - met[k]) <= near:
             explained += 1
-        elif measured > met[k] + expected.beyond:
-            seen = _seen_from(expected, x, y, heading, heading + k * expected.step * stride, measured)
+        elif measured > met[k] + beyond:
+            angle = heading + k * expected.step * stride
+            seen = _seen_from(expected, x, y, heading, angle, measured, near, beyond)
             explained += int(seen == EXPLAINED)
             contradicted += int(seen == CONTRADICTED)
     if known == 0:
@@ -133,10 +136,19 @@ def scan_fit(
 
 
 @kernel
-def _seen_from(expected: Expected, x: float, y: float, heading: float, angle: float, measured: float) -> int:
+def _seen_from(
+    expected: Expected,
+    x: float,
+    y: float,
+    heading: float,
+    angle: float,
+    measured: float,
+    near: float,
+    beyond: float,
+) -> int:
     """What the end of a beam is to the scanner among the eyes to which it fits the map best."""
     best = CONTRADICTED
-    near, beyond, eyes = expected.near, expected.beyond, expected.eyes
+    eyes = expected.eyes
     c, s = math.cos(heading), math.sin(heading)
     for i in range(eyes.shape[0]):
         ex, ey = x + c * eyes[i, 0] - s * eyes[i, 1], y + s * eyes[i, 0] + c * eyes[i, 1]
@@ -157,6 +169,7 @@ def fitting_poses(
     poses: FloatArray,
     ranges: FloatArray,
     stride: int,
+    extra: float,
     least_explained: float,
     most_contradicted: float,
 ) -> FloatArray:
@@ -165,7 +178,7 @@ def fitting_poses(
     count = 0
     for h in range(poses.shape[0]):
         x, y, heading = poses[h, 0], poses[h, 1], poses[h, 2] + expected.first
-        explained, contradicted = scan_fit(expected, x, y, heading, ranges, stride)
+        explained, contradicted = scan_fit(expected, x, y, heading, ranges, stride, extra)
         if explained >= least_explained and contradicted <= most_contradicted:
             kept[count, 0] = h
             kept[count, 1] = explained

@@ -81,9 +81,8 @@ class ScanFit:
     def of(self, pose: FloatArray, ranges_m: FloatArray, extra_m: float = 0.0) -> Fit:
         """Fit of a scan from a pose (3,) of the robot; ``extra_m`` widens both tolerances."""
         x, y, theta = self.sensor_pose(pose)
-        expected = self._widened(extra_m)
         explained, contradicted = pose_hypotheses.scan_fit(
-            expected, x, y, theta + expected.first, ranges_m, 1
+            self._expected, x, y, theta + self._expected.first, ranges_m, 1, extra_m
         )
         return Fit(explained, contradicted)
 
@@ -112,13 +111,7 @@ class ScanFit:
         most_contradicted: float,
     ) -> FloatArray:
         """The sensor poses (K, 3) among (H, 3) that fit the scan, best first, from every stride-th beam."""
-        expected = self._widened(extra_m)
         kept = pose_hypotheses.fitting_poses(
-            expected, sensor_poses, ranges_m, stride, least_explained, most_contradicted
+            self._expected, sensor_poses, ranges_m, stride, extra_m, least_explained, most_contradicted
         )
         return sensor_poses[kept[:, 0].astype(np.int64)]
-
-    def _widened(self, extra_m: float) -> pose_hypotheses.Expected:
-        """What is expected, with both tolerances wider."""
-        usual = self._expected
-        return usual._replace(near=usual.near + extra_m, beyond=usual.beyond + extra_m)
