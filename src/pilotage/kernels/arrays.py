@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TypeAlias
+from typing import Any, TypeAlias, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,17 @@ ByteArray: TypeAlias = NDArray[np.uint8]
 ShortArray: TypeAlias = NDArray[np.int16]
 UintArray: TypeAlias = NDArray[np.uint32]
 WordArray: TypeAlias = NDArray[np.uint64]
+
+
+Named = TypeVar("Named", bound=tuple[Any, ...])
+
+
+def unnamed(value: Named) -> Named:
+    """The same values without their names, for a kernel that is called at every scan and names them itself.
+
+    numba looks at a plain tuple in a tenth of the time that a ``NamedTuple`` takes it at each call, 1 us.
+    """
+    return cast(Named, tuple(value))
 
 
 def read_only(array: FloatArray) -> FloatArray:

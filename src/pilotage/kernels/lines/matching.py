@@ -14,11 +14,15 @@ from pilotage.kernels.lines.wall_candidates import MatchRules, SeenLines, Walls,
 def match_lines(
     pose: FloatArray, cov: FloatArray, seen: SeenLines, known: Walls, rules: MatchRules
 ) -> tuple[IntArray, FloatArray, int, int, float]:
-    """The wall of each line (L,), what ``candidates`` says of its distance (L,), and their ``tally``."""
-    count = seen.lines.shape[0]
-    options, distances = np.empty((count, rules.options), np.int64), np.empty(count)
-    counts = candidates(pose, cov, seen, known, rules, options, distances)
+    """The wall of each line (L,), what ``candidates`` says of its distance (L,), and their ``tally``.
+
+    The last three may be handed over ``unnamed``.
+    """
+    lines, walls, rule = SeenLines(*seen), Walls(*known), MatchRules(*rules)
+    count = lines.lines.shape[0]
+    options, distances = np.empty((count, rule.options), np.int64), np.empty(count)
+    counts = candidates(pose, cov, lines, walls, rule, options, distances)
     pairs = np.empty(count, np.int64)
-    associate(pose, cov, seen, known, rules, options, counts, pairs)
+    associate(pose, cov, lines, walls, rule, options, counts, pairs)
     paired, placed, largest = tally(pairs, distances)
     return pairs, distances, paired, placed, largest

@@ -24,6 +24,8 @@ def lines_of_scan(
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, IntArray, IntArray]:
     """Lines of a scan (N,) with beams along directions (N, 2), ``step`` apart; ``most_lines`` at most.
 
+    The rules may be handed over ``unnamed``.
+
     Returns
     -------
     lines, covs, ends, points, clusters, members
@@ -34,5 +36,6 @@ def lines_of_scan(
     clusters = scan_clusters(ranges, points, step, max_range, cutoff, least_cluster)
     lines, covs = np.empty((most_lines, 2)), np.empty((most_lines, 2, 2))
     ends, members = np.empty((most_lines, 4)), np.empty(ranges.shape[0], np.int64)
-    count = extract_lines(points, directions, clusters, rules, uniforms, lines, covs, ends, members)
+    rule = LineRules(*rules)
+    count = extract_lines(points, directions, clusters, rule, uniforms, lines, covs, ends, members)
     return lines[:count], covs[:count], ends[:count], points, clusters, members

@@ -10,6 +10,7 @@ from pydantic import Field
 from pilotage.core.chi_square import chi_square_quantile
 from pilotage.core.config import Config
 from pilotage.core.types import FloatArray, IntArray
+from pilotage.kernels.arrays import unnamed
 from pilotage.kernels.lines import joint_association
 from pilotage.kernels.lines.matching import match_lines
 from pilotage.kernels.lines.wall_candidates import MatchRules, SeenLines, Walls
@@ -86,8 +87,9 @@ class WallMatcher:
         self.joint_gates = np.array(
             [0.0, *(chi_square_quantile(gate, LINE_DOF * k) for k in range(1, MAX_LINES + 1))]
         )
-        self._known = Walls(self.walls.normals, self.walls.line_of, self.walls.segments_m, world.circles_m)
-        self._rules = MatchRules(
+        walls = self.walls
+        self._known = unnamed(Walls(walls.normals, walls.line_of, walls.segments_m, world.circles_m))
+        rules = MatchRules(
             self.gate,
             self.joint_gates,
             chi_square_quantile(config.ambiguity, LINE_DOF),
@@ -97,8 +99,9 @@ class WallMatcher:
             config.options,
             config.max_nodes,
         )
+        self._rules = unnamed(rules)
 
     def match(self, pose: FloatArray, cov: FloatArray, lines: DetectedLines) -> Matches:
         """Match lines seen from about ``pose`` (3,) with covariance ``cov`` (3, 3); changes neither."""
-        seen = SeenLines(self.mount, lines.rho_alpha, lines.covs, lines.ends_m)
+        seen = unnamed(SeenLines(self.mount, lines.rho_alpha, lines.covs, lines.ends_m))
         return Matches(*match_lines(pose, cov, seen, self._known, self._rules))

@@ -10,6 +10,7 @@ from pydantic import Field
 
 from pilotage.core.config import Config
 from pilotage.core.types import FloatArray, IntArray
+from pilotage.kernels.arrays import unnamed
 from pilotage.kernels.lines import clustering
 from pilotage.kernels.lines.extraction import LineRules
 from pilotage.kernels.lines.scan_lines import lines_of_scan
@@ -96,7 +97,7 @@ class LineExtractor:
     ) -> None:
         self._config = config
         threshold_m = config.inlier_sigmas * float(np.sqrt(range_var_m2))
-        self._rules = LineRules(
+        rules = LineRules(
             range_var_m2,
             threshold_m,
             config.gap_m,
@@ -106,6 +107,7 @@ class LineExtractor:
             float(scipy.special.ndtri(config.straight)),
             config.iterations,
         )
+        self._rules = unnamed(rules)
         self._max_range = min(config.max_range_m or lidar.sure_range_m, np.nextafter(lidar.max_range_m, 0.0))
         self._step = lidar.beam_step_rad
         self._directions = clustering.beam_directions(
