@@ -173,3 +173,59 @@ def update_range_bearings(
         outcome[k] = OUTCOME_ACCEPTED if nis[k] <= gate else OUTCOME_GATED
         used += outcome[k]
     return used, nis, outcome
+
+
+@kernel
+def filter_log(
+    pose: FloatArray,
+    cov: FloatArray,
+    increments: FloatArray,
+    densities: FloatArray,
+    ranges: FloatArray,
+    bearings: FloatArray,
+    landmarks: FloatArray,
+    mount: FloatArray,
+    R: FloatArray,
+    gate: float,
+    exact: bool,
+    poses: FloatArray,
+    covs: FloatArray,
+    nis: FloatArray,
+) -> int:
+    """Run the whole filter over a log; returns the number of measurements used.
+
+    Parameters
+    ----------
+    pose, cov
+        (3,) and (3, 3) the initial belief; moved in place to the final one.
+    increments
+        (T, 2) distance and angle of each step.
+    densities
+        (4,) variances of the distance per metre and per radian, of the angle per radian and per metre.
+    ranges, bearings
+        (T, M) measurements of the M landmarks; nan where one was not seen.
+    poses, covs, nis
+        (T, 3), (T, 3, 3) and (T, M) are filled; ``nis`` is nan where nothing was measured.
+    """
+    Q = np.zeros((2, 2))
+    z, innovation, H = np.empty(2), np.empty(2), np.empty((2, 3))
+    used = 0
+    for t in range(increments.shape[0]):
+        distance, angle = increments[t, 0], increments[t, 1]
+        Q[0, 0] = densities[0] * abs(distance) + densities[1] * abs(angle)
+        Q[1, 1] = densities[2] * abs(angle) + densities[3] * abs(distance)
+        predict(pose, cov, distance, angle, Q, exact)
+        for m in range(landmarks.shape[0]):
+            nis[t, m] = math.nan
+            if math.isnan(ranges[t, m]) or math.isnan(bearings[t, m]):
+                continue
+            mx, my = landmarks[m, 0], landmarks[m, 1]
+            if not range_bearing(pose, mx, my, mount, z, H):
+                continue
+            innovation[0], innovation[1] = ranges[t, m] - z[0], wrap(bearings[t, m] - z[1])
+            nis[t, m] = joseph_update2(pose, cov, H, innovation, R, gate)
+            if nis[t, m] <= gate:
+                used += 1
+        poses[t] = pose
+        covs[t] = cov
+    return used
