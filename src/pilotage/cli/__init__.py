@@ -1,5 +1,5 @@
 """The command line: parse arguments, call one function, print.
 
-Each command is a small module; what is heavy (numpy, numba, matplotlib) is imported inside the
-command that needs it, so that ``pilotage --help`` answers at once.
+Commands that belong together are a small module; what is heavy (numpy, numba, matplotlib) is
+imported inside the command that needs it, so that ``pilotage --help`` answers at once.
 """

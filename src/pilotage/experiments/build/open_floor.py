@@ -13,15 +13,11 @@ import scipy
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray
 from pilotage.kernels.grids.blocked_distance import distance_to_blocked
-from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.floor import SNAP_M, Floor
-from pilotage.maps.known_maps import OncePerMap
 from pilotage.maps.pieces import beside_edge, meant_piece
 from pilotage.maps.world_map import WorldMap
 from pilotage.missions.places import PoseConfig
 
-GRID_M = 0.1
-_FIELDS: OncePerMap[DistanceField] = OncePerMap()
 DRAWS_AT_ONCE = 1000
 MAX_DRAWS = 100_000
 EASY_M, STEP_M = 0.1, 0.15
@@ -71,7 +67,7 @@ class OpenFloor:
         about: tuple[float, float] | None = None,
     ) -> None:
         self._chart, self._clearance_m = chart, clearance_m
-        self._field = chart.field if chart.geometry is None else _finer_field(chart)
+        self._field = chart.field
         self._regions, _ = scipy.ndimage.label(self._field.distance_m >= clearance_m)
         if reachable_from is None:
             by_robot = chart.geometry is None and not chart.open_ground
@@ -188,8 +184,3 @@ def room_m(chart: WorldMap, x_m: float, y_m: float, asked_m: float) -> float:
     reach = math.ceil(asked_m / grid.resolution_m) + 2
     places = grid.places_at(np.array([[x_m, y_m]]))
     return float(distance_to_blocked(places, grid.blocked(), reach)[0]) * grid.resolution_m
-
-
-def _finer_field(chart: WorldMap) -> DistanceField:
-    """Distances to walls, nearer to each other than on the map's own field."""
-    return _FIELDS.get(chart, GRID_M, lambda: DistanceField.from_map(chart.walls))
