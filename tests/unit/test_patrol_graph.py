@@ -278,9 +278,9 @@ def test_the_vertex_that_is_nearest_behind_a_wall_is_not_where_a_robot_begins() 
     floor = Floor.of(WORLD, 0.25)
     places = np.array([[5.4, 4.4], [8.5, 2.5]])
     # The other one is 1.2 m away, through the wall.
-    assert np.argmin(floor.away_m(places, np.array([6.6, 4.4]))) == 1
-    assert np.argmin(floor.away_m(places[::-1], np.array([6.6, 4.4]))) == 0
-    assert np.argmin(floor.away_m(places, np.array([5.0, 2.5]))) == 0
+    points = np.array([[6.6, 4.4], [5.0, 2.5]])
+    np.testing.assert_array_equal(np.argmin(floor.away_m(places, points), axis=1), [1, 0])
+    np.testing.assert_array_equal(np.argmin(floor.away_m(places[::-1], points), axis=1), [0, 1])
 
 
 def test_graphs_of_the_same_floor_are_one() -> None:

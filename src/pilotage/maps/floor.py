@@ -13,8 +13,9 @@ from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray, IntArray
 from pilotage.kernels.arrays import ByteArray
 from pilotage.kernels.geometry.field import sample_distance
+from pilotage.kernels.grids.path_lengths import path_lengths
 from pilotage.kernels.grids.theta import line_of_sight
-from pilotage.kernels.grids.travel_cost import some_travel_costs, travel_costs
+from pilotage.kernels.grids.travel_cost import some_travel_costs
 from pilotage.kernels.patrol.pull import pulled_corners
 from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.pieces import beside_edge, meant_piece, outside_of
@@ -257,9 +258,9 @@ class Floor:
 
     def costs_from(self, point_xy_m: FloatArray, what: str = "place") -> FloatArray:
         """Cells of path, by neighbours, from a place to each cell, flat."""
-        row, column = self.nearest_cell(point_xy_m, what)
-        factor = np.where(self.reachable, 1.0, np.inf)
-        return travel_costs(factor, row * factor.shape[1] + column, 1.0, 1.0)[0]
+        states, stride = self._states
+        length = self._lengths_from(point_xy_m, np.full(states.size, np.inf), what)
+        return length.reshape(-1, stride)[1:-1, 1:-1].ravel()
 
     def regions_of(self, places_xy_m: FloatArray, what: str = "place") -> IntArray:
         """(rows, columns) which of places (P, 2) is nearest by neighbours, the first of several; -1: none.
@@ -269,28 +270,32 @@ class Floor:
         InputError
             Where a place is off the reachable floor.
         """
-        factor = np.where(self.reachable, 1.0, np.inf)
-        nearest = np.full(factor.size, np.inf)
-        region, everywhere = np.full(factor.size, -1, dtype=np.int64), np.zeros(0, np.int64)
+        states, stride = self._states
+        nearest = np.full(states.size, np.inf)
+        region = np.full(nearest.size, -1, dtype=np.int64)
         for number, place in enumerate(places_xy_m):
-            row, column = self.nearest_cell(place, f"{what} {number}")
-            start = row * factor.shape[1] + column
-            cost, _ = some_travel_costs(factor, start, 1.0, 1.0, nearest, everywhere)
-            nearer = cost < nearest
-            nearest[nearer], region[nearer] = cost[nearer], number
-        return region.reshape(factor.shape)
+            length = self._lengths_from(place, nearest, f"{what} {number}")
+            nearer = length < nearest
+            nearest[nearer], region[nearer] = length[nearer], number
+        return region.reshape(-1, stride)[1:-1, 1:-1].copy()
 
-    def away_m(self, places_xy_m: FloatArray, point_xy_m: FloatArray, what: str = "place") -> FloatArray:
-        """(P,) how long the path from a point to each of places (P, 2) is, by neighbouring cells.
+    def _lengths_from(self, point_xy_m: FloatArray, below: FloatArray, what: str) -> FloatArray:
+        """Cells of path from a place to each of the padded floor's cells that ``below`` is no nearer to."""
+        states, stride = self._states
+        row, column = self.nearest_cell(point_xy_m, what)
+        return path_lengths(states, stride, (row + 1) * stride + column + 1, below)
+
+    def away_m(self, places_xy_m: FloatArray, points_xy_m: FloatArray, what: str = "place") -> FloatArray:
+        """(N, P) how long the path from each of points (N, 2) to each of places (P, 2) is, by neighbours.
 
         Raises
         ------
         InputError
-            Where the point or a place is off the reachable floor.
+            Where a point or a place is off the reachable floor.
         """
-        costs = self.costs_from(point_xy_m, what)
+        costs = np.array([self.costs_from(point, f"{what} {k}") for k, point in enumerate(points_xy_m)])
         rows, columns = np.array([self.nearest_cell(place) for place in places_xy_m]).T
-        return np.asarray(self.cell_m * costs[rows * self.reachable.shape[1] + columns])
+        return np.asarray(self.cell_m * costs[:, rows * self.reachable.shape[1] + columns])
 
     def coarser(self) -> Floor:
         """The same floor in cells of twice the side, each reachable where any of its four is."""
@@ -326,8 +331,7 @@ class Floor:
             row * columns + column for row, column in map(self.nearest_cell, (start_xy_m, *ends_xy_m))
         )
         factor = np.where(self.reachable, 1.0, np.inf)
-        nothing = np.full(factor.size, np.inf)
-        _, parent = some_travel_costs(factor, start, 1.0, 1.0, nothing, np.unique(ends))
+        _, parent = some_travel_costs(factor, start, 1.0, 1.0, np.unique(ends))
         return [self._corners_m(pulled_corners(*self._states, parent, columns, end))[::-1] for end in ends]
 
     def _corners_m(self, cells: IntArray) -> FloatArray:
@@ -357,14 +361,13 @@ class Floor:
         cells = [self.nearest_cell(place, f"{what} {k}") for k, place in enumerate(places_xy_m)]
         flat = np.array([row * columns + column for row, column in cells], dtype=np.int64)
         factor = np.where(self.reachable, 1.0, np.inf)
-        anything = np.full(factor.size, np.inf)
         out = np.full((count, count), np.inf)
         np.fill_diagonal(out, 0.0)
         for a in range(count):
             others = np.flatnonzero(wanted[a] & (np.arange(count) > a))
             if len(others) == 0:
                 continue
-            _, parent = some_travel_costs(factor, flat[a], 1.0, 1.0, anything, np.unique(flat[others]))
+            _, parent = some_travel_costs(factor, flat[a], 1.0, 1.0, np.unique(flat[others]))
             for b in others:
                 corners = pulled_corners(*states, parent, columns, flat[b])
                 steps = np.diff(np.column_stack([corners // columns, corners % columns]), axis=0)

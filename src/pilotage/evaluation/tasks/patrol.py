@@ -282,13 +282,12 @@ def _site(config: PatrolConfig, setting: TaskSetting, reach_m: float) -> tuple[F
 
 def _starts_m(graph: PatrolGraph, floor: Floor, setting: TaskSetting) -> FloatArray:
     """(N, V) how far each robot's starting place is from each vertex, around walls."""
-    found = []
-    for index, robot in enumerate(setting.mission.members):
+    starts = []
+    for robot in setting.mission.members:
         start = setting.mission.start_of(robot)
         assert start is not None, "settled when the mission was built"
-        place = np.array([start.x_m, start.y_m])
-        found.append(floor.away_m(graph.vertices_xy_m, place, f"start of robot {index}"))
-    return np.array(found)
+        starts.append((start.x_m, start.y_m))
+    return floor.away_m(graph.vertices_xy_m, np.array(starts), "start of robot")
 
 
 def _turn_m(setting: TaskSetting, index: int, near_m: float) -> float:

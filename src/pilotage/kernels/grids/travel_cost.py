@@ -33,22 +33,17 @@ def travel_costs(
     parent
         (rows * columns,) -1 for the start and where no path leads.
     """
-    size = factor.shape[0] * factor.shape[1]
-    everywhere = np.zeros(0, np.int64)
-    return some_travel_costs(factor, start, width_m, height_m, np.full(size, np.inf), everywhere)
+    return some_travel_costs(factor, start, width_m, height_m, np.zeros(0, np.int64))
 
 
 @kernel
 def some_travel_costs(
-    factor: FloatArray, start: int, width_m: float, height_m: float, below: FloatArray, until: IntArray
+    factor: FloatArray, start: int, width_m: float, height_m: float, until: IntArray
 ) -> tuple[FloatArray, IntArray]:
     """The same, to the bit, for some of the nodes; what there is of others is of no use.
 
     Parameters
     ----------
-    below
-        (rows * columns,) costs from somewhere else, the least of several or infinite: nodes that cost no less
-        than from there lie on no path to where it costs less, are not gone through, and stay infinite.
     until
         (K,) flat indices, each once; the search is over when it knows them all. Empty: when it knows all.
     """
@@ -107,7 +102,7 @@ def some_travel_costs(
                     step = diagonal_m
                 new = cost[node] + step * 0.5 * (here + there)
                 to = r * columns + c
-                if new < cost[to] and new < below[to]:
+                if new < cost[to]:
                     cost[to] = new
                     parent[to] = node
                     at = length
