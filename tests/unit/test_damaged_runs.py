@@ -35,6 +35,7 @@ def a_floor(folder: Path) -> Path:
     levels = np.arange(30, dtype=np.uint16).reshape(3, 10) * 1000
     arrays = {
         "scan_t_s": np.arange(3.0),
+        "scan_poses": np.zeros((3, 3)),
         "scan_ranges": levels,
         "scan_resolution_m": np.array(1e-4),
         "scan_angles_rad": np.linspace(-1.0, 1.0, 10),

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from pilotage.core.errors import InputError
+from pilotage.core.types import Pose2
 from pilotage.experiments.sightings import MOST_SCANS, Sightings
 from pilotage.records.run_data import read_run
 from pilotage.records.trace import Trace
@@ -44,7 +45,8 @@ def replayable_run(folder: Path, steps: int = 3000, **changes: Any) -> Path:
         scan = LidarScan(np.minimum(rng.uniform(0.5, 25.0, 539), 20.0))
         seen = np.array(ids[: step % (len(ids) + 1)], dtype=np.int64)
         beacons = BeaconReadings(seen, np.ones(len(seen)), np.zeros(len(seen)))
-        sightings.record(Readings(0.1 * (step + 1), {"lidar": scan, "beacons": beacons}))
+        readings = Readings(0.1 * (step + 1), {"lidar": scan, "beacons": beacons})
+        sightings.record(readings, Pose2(0.1 * step, 1.0, 0.01 * step))
     np.savez_compressed(folder / "scans.npz", allow_pickle=False, **sightings.arrays())
     return folder
 
@@ -76,9 +78,11 @@ def test_sightings_come_back_as_they_were_seen(tmp_path: Path) -> None:
 def test_sightings_do_not_grow_without_end() -> None:
     sightings = Sightings({"lidar": LidarConfig(beams=2)})
     for step in range(4 * MOST_SCANS):
-        sightings.record(Readings(0.5 * step, {"lidar": LidarScan(np.ones(2))}))
-    times = sightings.arrays()["scan_t_s"]
+        sightings.record(Readings(0.5 * step, {"lidar": LidarScan(np.ones(2))}), Pose2(0.5 * step, 0.0, 0.0))
+    arrays = sightings.arrays()
+    times = arrays["scan_t_s"]
     assert MOST_SCANS / 2 < len(times) <= MOST_SCANS
+    np.testing.assert_array_equal(arrays["scan_poses"][:, 0], times)
     assert times[-1] > 0.5 * 4 * MOST_SCANS - 10.0
 
 
@@ -108,8 +112,21 @@ def test_scans_of_a_run_recorded_once_a_second_are_those_of_its_frames(tmp_path:
     seldom = Trace({name: run.trace[name][9::10] for name in run.trace.columns}, 30)
     scene = floor_scene(replace(run, trace=seldom))
     assert scene is not None
-    # Of five a second those that a frame has the pose of lie where they were seen.
-    np.testing.assert_allclose(scene.scans[0].t_s, scene.t_s, atol=0.11)
+    (scan,) = scene.scans
+    np.testing.assert_allclose(scan.t_s, scene.t_s, atol=0.11)
+    # They lie where they were seen, whatever the frames have of that.
+    steps = np.rint(10.0 * scan.t_s) - 1.0
+    np.testing.assert_allclose(scan.poses, np.stack([0.1 * steps, np.ones(len(steps)), 0.01 * steps], axis=1))
+
+
+def test_scans_of_folders_that_do_not_say_from_where_are_not_drawn(tmp_path: Path) -> None:
+    folder = replayable_run(tmp_path / "run", steps=30)
+    with np.load(folder / "scans.npz") as file:
+        kept = {name: file[name] for name in file if name != "scan_poses"}
+    np.savez_compressed(folder / "scans.npz", allow_pickle=False, **kept)
+    scene = floor_scene(read_run(folder))
+    assert scene is not None
+    assert np.isnan(scene.scans[0].poses).all()
 
 
 def test_a_carried_robot_breaks_the_way(tmp_path: Path) -> None:
@@ -225,18 +242,22 @@ def test_a_lost_robot_has_no_ellipse_but_a_word(browser: Browser, tmp_path: Path
     assert browser.js(f"{PLAYER}.seek(15.0) || {said}") == ""
 
 
-def test_a_scan_between_two_frames_is_drawn_from_between_them(browser: Browser, tmp_path: Path) -> None:
+def test_a_scan_is_drawn_from_where_it_was_taken(browser: Browser, tmp_path: Path) -> None:
     t_s, still, forward = np.arange(4.0), np.zeros(4), np.zeros(1)
-    scan = ScanTrack("scan", np.array([1.5]), np.array([[2.0]]), forward, np.zeros(3), 0, "ink")
+    poses = np.array([[np.nan] * 3, [6.0, 1.0, 0.0]])
+    scan = ScanTrack("scan", np.array([0.5, 1.5]), np.array([[2.0], [2.0]]), forward, poses, "ink")
     robot = PoseTrack("robot", 4.0 * t_s, still, still, "ink")
     page = tmp_path / "page.html"
     scene = ReplayScene(t_s, (0.0, -5.0, 12.0, 5.0), poses=(robot,), scans=(scan,))
     page.write_text(f"<!DOCTYPE html><body>{replay_section(scene).html}", encoding="utf-8")
     browser.open(page, READY)
     drawn = (
-        "const m = p.map; let at; m.drawScans({fillRect: (x) => { at = x + 2; }}, 2.2); return at - m.px(8);"
+        "const m = p.map; let at = null; m.drawScans({fillRect: (x) => { at = x + 2; }}, t); "
+        "return at === null ? null : at - m.px(8);"
     )
-    assert browser.js(f"(() => {{ const p = {PLAYER}; {drawn} }})()") == pytest.approx(0.0, abs=0.1)
+    draw = f"((t) => {{ const p = {PLAYER}; {drawn} }})"
+    assert browser.js(f"{draw}(2.2)") == pytest.approx(0.0, abs=0.1)
+    assert browser.js(f"{draw}(1.2)") is None
 
 
 def test_cells_fill_in_and_empty_again(browser: Browser, tmp_path: Path) -> None:

@@ -81,7 +81,7 @@ def run_loop(experiment: Experiment, on_progress: OnProgress | None = None) -> R
                 recorders[index].record(readings[index], commands[index])
             else:
                 recorders[index].pass_over(readings[index])
-            sightings[index].record(readings[index])
+            sightings[index].record(readings[index], attempts[index].body.pose)
             update = member.journal.update
             if update is not None:
                 albums[index].offer(source.t_s, update)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pilotage.core.types import FloatArray, IntArray
+from pilotage.core.types import FloatArray, IntArray, Pose2
 from pilotage.records import scans as records
 from pilotage.sensors.beacon import BeaconConfig
 from pilotage.sensors.lidar import LidarConfig
@@ -37,11 +37,12 @@ class Sightings:
         self._apart_s = APART_S
         self._scan_t_s: list[float] = []
         self._scans: list[FloatArray] = []
+        self._poses: list[FloatArray] = []
         self._seen: list[IntArray] = []
         self._nothing: IntArray = np.empty(0, dtype=np.int64)
 
-    def record(self, readings: Readings) -> None:
-        """Keep what this step's readings show; called once a step."""
+    def record(self, readings: Readings, pose: Pose2) -> None:
+        """Keep what this step's readings show from where the robot is; called once a step."""
         seen = self._nothing
         if self._beacons is not None:
             reading = readings.by_sensor.get(self._beacons)
@@ -57,8 +58,10 @@ class Sightings:
         if isinstance(scan, LidarScan):
             self._scan_t_s.append(readings.t_s)
             self._scans.append(scan.ranges_m[:: self._stride].astype(np.float32))
+            self._poses.append(pose.as_array())
             if len(self._scans) > MOST_SCANS:
                 self._scans, self._scan_t_s = self._scans[::2], self._scan_t_s[::2]
+                self._poses = self._poses[::2]
                 self._apart_s *= 2.0
 
     def seen(self) -> records.Sightings:
@@ -69,6 +72,7 @@ class Sightings:
             out = records.Sightings(
                 scan_t_s=np.array(self._scan_t_s),
                 ranges_m=np.stack(self._scans).astype(np.float64),
+                scan_poses=np.stack(self._poses),
                 angles_rad=self._config.beam_angles_rad()[:: self._stride],
                 mount=mount.as_array(),
                 max_range_m=self._config.max_range_m,

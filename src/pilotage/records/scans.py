@@ -35,6 +35,9 @@ class Sightings:
     ----------
     scan_t_s, ranges_m
         (S,) times and (S, B) ranges of the scans that were kept, nan where nothing was in reach.
+    scan_poses
+        (S, 3) where the robot was then: truly, or where nobody knows that, as it believed; nan in folders of
+        versions that did not keep it.
     angles_rad, mount
         (B,) directions of the beams in the scanner's frame; (3,) pose of the scanner on the robot.
     beacon_counts, beacon_ids
@@ -46,6 +49,7 @@ class Sightings:
 
     scan_t_s: FloatArray = field(default_factory=_empty)
     ranges_m: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
+    scan_poses: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
     angles_rad: FloatArray = field(default_factory=_empty)
     mount: FloatArray = field(default_factory=lambda: np.zeros(3))
     beacon_counts: IntArray = field(default_factory=_no_ids)
@@ -63,6 +67,7 @@ def sighting_arrays(sightings: Sightings) -> Mapping[str, Any]:
         levels = np.where(hit, np.rint(np.where(hit, ranges, 0.0) / resolution_m), NOTHING)
         arrays |= {
             "scan_t_s": sightings.scan_t_s,
+            "scan_poses": sightings.scan_poses,
             "scan_ranges": levels.astype(np.uint16),
             "scan_resolution_m": np.array(resolution_m),
             "scan_angles_rad": sightings.angles_rad,
@@ -93,20 +98,25 @@ def _sightings(arrays: Arrays) -> Sightings:
     return Sightings(*_scans(arrays), *_beacons(arrays), max_range_m)
 
 
-def _scans(arrays: Arrays) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+def _scans(arrays: Arrays) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
     empty = Sightings()
     if "scan_t_s" not in arrays:
-        return empty.scan_t_s, empty.ranges_m, empty.angles_rad, empty.mount
+        return empty.scan_t_s, empty.ranges_m, empty.scan_poses, empty.angles_rad, empty.mount
     t_s, angles_rad = arrays.floats("scan_t_s", -1), arrays.floats("scan_angles_rad", -1)
     levels = arrays.ints("scan_ranges", len(t_s), len(angles_rad))
+    poses = np.full((len(t_s), 3), np.nan)
+    if "scan_poses" in arrays:
+        poses = arrays.floats("scan_poses", len(t_s), 3)
     mount, resolution_m = arrays.floats("scan_mount", 3), arrays.scalar("scan_resolution_m")
     if not (np.isfinite(t_s).all() and (np.diff(t_s) >= 0.0).all()):
         raise ValueError("expected scans in the order of time")
     if not (np.abs(mount) <= FARTHEST_M).all() or not np.isfinite(angles_rad).all():
         raise ValueError("scan_mount, scan_angles_rad: expected finite numbers")
+    if not (np.isnan(poses) | (np.abs(poses) <= FARTHEST_M)).all():
+        raise ValueError(f"scan_poses: expected numbers within {FARTHEST_M:g}")
     if not 0.0 < resolution_m * LEVELS <= FARTHEST_M or bool(((levels < 0) | (levels > NOTHING)).any()):
         raise ValueError(f"scan_ranges: expected numbers from 0 to {NOTHING} in steps of more than 0 m")
-    return t_s, np.where(levels == NOTHING, np.nan, levels * resolution_m), angles_rad, mount
+    return t_s, np.where(levels == NOTHING, np.nan, levels * resolution_m), poses, angles_rad, mount
 
 
 def _beacons(arrays: Arrays) -> tuple[IntArray, IntArray]:

@@ -140,7 +140,7 @@ def follow(
                 told[i], total[i] = total[i], math.nan
             rows.append([readings.t_s, x, y, heading, *pose.as_array(), *upper, *told])
             localized.append(listener.belief.status is BeliefStatus.LOCALIZED)
-            seen.record(readings)
+            seen.record(readings, Pose2(x, y, theta) if math.isfinite(x + y + theta) else pose)
         if steps is not None and k >= steps:
             break
     columns = (*TRUTH_COLUMNS, *BELIEF_COLUMNS, *names)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from pilotage.core.types import FloatArray, IntArray
+from pilotage.core.types import FloatArray, IntArray, Pose2
 from pilotage.records.run_data import RunData
 from pilotage.report.figures.grid import OCCUPIED_COLOUR, UNKNOWN_COLOUR, cell_classes, known_corners
 from pilotage.report.figures.layers import body_outline
@@ -57,10 +57,10 @@ def floor_scene(run: RunData) -> ReplayScene | None:
         return np.where(np.isfinite(values), values, np.nan)
 
     poses = _poses(run, column)
-    scan, thinned_scans = _scan(run, t_s[frames], 0)
+    scan = _scan(run, t_s[frames])
     note = [
         f"One step in {stride} is shown." if stride > 1 else "",
-        "Scans are thinned, in time and in beams." if thinned_scans else "",
+        "Scans are thinned, in time and in beams." if scan else "",
     ]
     return ReplayScene(
         t_s=t_s[frames],
@@ -188,25 +188,25 @@ def _evenly(n: int, most: int) -> IntArray:
     return np.unique(np.linspace(0, n - 1, min(n, most)).round().astype(np.int64))
 
 
-def _scan(run: RunData, frames_s: FloatArray, seen_from: int) -> tuple[tuple[ScanTrack, ...], bool]:
-    """Each frame's nearest scan, thinned: where the robot was between two frames is less sure."""
+def _scan(run: RunData, frames_s: FloatArray) -> tuple[ScanTrack, ...]:
+    """Each frame's nearest scan, thinned."""
     seen = run.sightings
     if not seen.ranges_m.size:
-        return (), False
+        return ()
     middles = 0.5 * (seen.scan_t_s[1:] + seen.scan_t_s[:-1])
     nearest = np.unique(np.searchsorted(middles, frames_s - 1e-6))
     stride = max(1, math.ceil(nearest.size * seen.ranges_m.shape[1] / MOST_SCAN_VALUES))
     shown = nearest[::stride]
+    mount = Pose2.from_array(seen.mount)
     track = ScanTrack(
         "scan",
         seen.scan_t_s[shown],
         seen.ranges_m[shown],
         seen.angles_rad,
-        seen.mount,
-        seen_from,
+        np.array([Pose2.from_array(pose).compose(mount).as_array() for pose in seen.scan_poses[shown]]),
         SKY,
     )
-    return (track,), True
+    return (track,)
 
 
 def _sights(run: RunData, frames: IntArray, seen_from: int) -> tuple[SightTrack, ...]:

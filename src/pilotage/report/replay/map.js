@@ -320,23 +320,19 @@ class ReplayMap {
     });
   }
 
-  // A scan stays where it was taken until the next one, between two frames where the robot was between them.
+  // A scan stays where it was taken until the next one.
   drawScans(pen, t) {
     for (const track of this.scene.scans) {
-      const k = lastBefore(track.t_s, t + 1e-6), poses = this.scene.poses[track.seen_from];
-      if (k < 0 || !this.shows(track) || !poses) continue;
-      const at = this.scene.t_s, i = Math.max(lastBefore(at, track.t_s[k] + 1e-4), 0);
-      const since = (track.t_s[k] - at[i]) / (at[i + 1] - at[i]);
-      const [x, y, th] = this.pose(poses, i, since > 1e-3 ? Math.min(since, 1) : 0);
+      const k = lastBefore(track.t_s, t + 1e-6);
+      if (k < 0 || !this.shows(track)) continue;
+      const [x, y, th] = track.poses.slice(3 * k, 3 * k + 3), beams = track.angles_rad.length;
       if (!(x === x && y === y && th === th)) continue;
-      const c = Math.cos(th), s = Math.sin(th), beams = track.angles_rad.length;
-      const sx = x + c * track.mount[0] - s * track.mount[1], sy = y + s * track.mount[0] + c * track.mount[1];
       pen.fillStyle = this.colour(track.colour);
       for (let b = 0; b < beams; b++) {
         const level = track.ranges[k * beams + b];
         if (level === 65535) continue;
-        const angle = th + track.mount[2] + track.angles_rad[b], r = level * track.step_m;
-        pen.fillRect(this.px(sx + r * Math.cos(angle)) - 2, this.py(sy + r * Math.sin(angle)) - 2, 4, 4);
+        const angle = th + track.angles_rad[b], r = level * track.step_m;
+        pen.fillRect(this.px(x + r * Math.cos(angle)) - 2, this.py(y + r * Math.sin(angle)) - 2, 4, 4);
       }
     }
   }

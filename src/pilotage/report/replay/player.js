@@ -116,7 +116,10 @@ class ReplayPlayer {
     for (const group of [s.rasters, s.lines, s.circles, s.marks, s.paths, s.sights, s.scans, s.discs, s.poses]) {
       for (const layer of group) {
         const size = layer.lines_m || layer.circles_m;
-        if (!size || size.length) seen.set(layer.name, layer.colour || (layer.palette || ["muted"]).at(-1));
+        if (size && !size.length) continue;
+        const colour = layer.colour || (layer.palette || ["muted"]).at(-1);
+        // What each robot of a team has in its own colour has none of its own.
+        seen.set(layer.name, seen.has(layer.name) && seen.get(layer.name) !== colour ? "muted" : colour);
       }
     }
     for (const [name, colour] of seen) {

@@ -100,14 +100,13 @@ class DiscTrack:
 
 @dataclass(frozen=True, slots=True)
 class ScanTrack:
-    """Scans (S, B) seen from a pose track (by its number), each shown until the next; nan for no return."""
+    """Scans (S, B) from poses (S, 3) of the scanner, each shown until the next; nan for no return."""
 
     name: str
     t_s: FloatArray
     ranges_m: FloatArray
     angles_rad: FloatArray
-    mount: FloatArray
-    seen_from: int
+    poses: FloatArray
     colour: str
 
 

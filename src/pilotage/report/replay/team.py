@@ -40,7 +40,7 @@ def team_scene(team: Sequence[RunData]) -> ReplayScene | None:
                 name="scans",
                 t_s=track.t_s[:: len(scenes)],
                 ranges_m=track.ranges_m[:: len(scenes)],
-                seen_from=first,
+                poses=track.poses[:: len(scenes)],
                 colour=colour,
             )
             for track in scene.scans

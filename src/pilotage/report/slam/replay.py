@@ -133,7 +133,7 @@ def _scans(data: SlamFolder, own: BoolArray) -> tuple[ScanTrack, ...]:
     ranges = data.keyframes.ranges_m[np.ix_(chosen, beam)].astype(np.float64)
     ranges[~np.isfinite(ranges) | (ranges <= 0.0)] = np.nan
     directions = angles[0, 0] + beam * angles[1, 0]
-    return (ScanTrack("scan", _times(data)[chosen], ranges, directions, np.zeros(3), 0, SKY),)
+    return (ScanTrack("scan", _times(data)[chosen], ranges, directions, data.keyframe_poses[chosen], SKY),)
 
 
 def _loops(data: SlamFolder, closed: list[ClosureRow]) -> tuple[PathTrack, ...]:
