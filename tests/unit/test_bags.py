@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 import os
+import sqlite3
 import sys
 from collections.abc import Callable
 from dataclasses import replace
@@ -21,6 +22,7 @@ from pilotage.logs.bags import read_bag
 from pilotage.logs.laser_log import LaserLog
 from pilotage.logs.message_types import shared, told_types
 from pilotage.logs.rosbags_extra import rosbags
+from pilotage.logs.salvage import unpacking
 from pilotage.logs.salvage.found import BagFormat, Salvage
 from pilotage.logs.salvage.walk import WALKS
 from support.damage import endless_rows
@@ -368,6 +370,46 @@ def test_a_database_whose_rows_never_end_is_given_up(tmp_path: Path) -> None:
     (tmp_path / "a.db3").write_bytes(endless_rows())
     with pytest.raises(InputError, match="rows without end"):
         read_bag(tmp_path / "a.db3")
+
+
+PACKED = ["ros1-bz2", "ros1-lz4", "foreign-mcap", "foreign-mcap-lz4", "ros2-sqlite-zstd-messages"]
+
+
+@pytest.mark.parametrize(
+    ("form", "limit", "most"),
+    [
+        *((form, "PART_BYTES", 10) for form in PACKED),
+        *((form, "BAG_BYTES", -(10**7)) for form in (*PACKED, "ros2-sqlite-zstd-file")),
+    ],
+)
+def test_a_part_that_unpacks_to_too_much_is_refused(
+    form: str, limit: str, most: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A chunk of 180 kB stood for 6 GB, in the library as in the walk through a damaged bag."""
+    path = FORMS[form](tmp_path, drive(3))
+    monkeypatch.setattr(unpacking, limit, most)
+    with pytest.raises(InputError, match=r"expected at most .* MB, found more"):
+        read_bag(path)
+
+
+def test_values_that_a_database_makes_up_are_not_read(tmp_path: Path) -> None:
+    """40 rows of 900 MB each came out of 40 kB."""
+    path = write_ros2(tmp_path / "a", drive())
+    with contextlib.closing(sqlite3.connect(path / "a.db3")) as base, base:
+        base.executescript(
+            """alter table messages rename to written;
+            create table messages (id, topic_id, timestamp, data as (zeroblob(900000000)));
+            insert into messages select id, topic_id, timestamp from written;"""
+        )
+    with pytest.raises(InputError, match="too big"):
+        read_bag(path)
+    with contextlib.closing(sqlite3.connect(path / "a.db3")) as base, base:
+        base.executescript(
+            """drop table messages;
+            create view messages as select a.* from written a, written b, written c, written d;"""
+        )
+    with pytest.raises(InputError, match="expected a topic of"):
+        read_bag(path)
 
 
 def test_a_cut_bag_of_packed_messages(tmp_path: Path) -> None:

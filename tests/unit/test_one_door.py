@@ -65,7 +65,11 @@ ALLOWED = {
     ("tracking/film.py", "cv2.VideoCapture"): "FFmpeg reads films by itself, after require_file",
     ("logs/mat.py", "loadmat"): "of bytes that came through the door",
     ("experiments/calibrate_commands.py", "json.loads"): "of what json.dumps just wrote",
-    ("logs/salvage/sqlite.py", "sqlite3.connect"): "in memory, of bytes that came through the door",
+    (
+        "logs/salvage/sqlite.py",
+        "sqlite3.connect",
+    ): "in memory, of bytes that came through the door; and what tables one has that rosbags opens next",
+    ("logs/bounded_rosbags.py", "*.open"): "the library's own method, behind a look at the database's tables",
     ("cli/main.py", "*.open"): "the null device, where a stream was closed",
     ("cli/study_page.py", "*.read_text"): "the page that was just written",
     ("report/markup.py", "*.read_text"): "the page's own style sheet",

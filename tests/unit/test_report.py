@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import matplotlib
@@ -13,9 +14,11 @@ import pytest
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import Event
+from pilotage.records.cells import SheetData
 from pilotage.records.run_data import read_run
 from pilotage.report import write_report
 from pilotage.report.figures.timeline import timeline_figure
+from pilotage.report.sheet.path import coverage_figure, path_figure
 from pilotage.report.style import drawing_style
 from support.fabricated_run import (
     fabricate_columns,
@@ -187,6 +190,33 @@ def test_lines_that_nobody_could_tell_apart_are_drawn_once(tmp_path: Path) -> No
     run = read_run(fabricate_run(tmp_path / "run", events=events))
     with drawing_style():
         assert len(timeline_figure(run).svg) < 30_000
+
+
+def test_events_at_one_place_of_a_sheet_share_a_badge(tmp_path: Path) -> None:
+    events = [{"t_s": 0.1 + 1e-6 * i, "kind": "stopped", "text": "again"} for i in range(2000)]
+    run = read_run(fabricate_run(tmp_path / "run", events=events))
+    states, everywhere = np.zeros((2, 2), np.uint8), np.ones((2, 2), np.bool_)
+    sheet = SheetData(
+        (1.0, 1.0),
+        np.empty((0, 4)),
+        (),
+        0.02,
+        0.1,
+        states,
+        states,
+        everywhere,
+        everywhere,
+        np.zeros((2, 2)),
+        everywhere,
+        np.empty((0, 2), np.int64),
+        (),
+    )
+    run = replace(run, sheet=sheet)
+    with drawing_style():
+        svg = path_figure(run).svg
+        assert "2–2000" in svg
+        assert len(svg) < 60_000
+        assert len(coverage_figure(run).svg) < 60_000
 
 
 def test_long_run_stays_small_and_keeps_its_peak(tmp_path: Path) -> None:

@@ -14,10 +14,11 @@ from typing import Any, TypeAlias, TypeVar
 
 from pilotage.core.errors import InputError
 from pilotage.core.files import opened, read_yaml
+from pilotage.logs.bounded_rosbags import bound_library, current_unpacker
 from pilotage.logs.message_types import sharing, shipped_types, told_types
 from pilotage.logs.rosbags_extra import rosbags
 from pilotage.logs.salvage.found import MAGIC_OF, BagFormat, Salvage
-from pilotage.logs.salvage.pieces import unpack
+from pilotage.logs.salvage.unpacking import Unpacker
 from pilotage.logs.salvage.walk import salvage_file, salvaged_messages
 
 ZSTD = b"\x28\xb5\x2f\xfd"
@@ -141,9 +142,13 @@ def open_whole(path: Path, stack: ExitStack) -> OpenBag | None:
     if path.is_dir() and not _sound(path):
         return None
     try:
+        bound_library()
+        current_unpacker.set(Unpacker(path))
         reader = reader_of([path], default_typestore=shipped_types("LATEST"))
         stack.enter_context(reader)
         topics = _sum_up((c.topic, c.msgtype, c.msgcount) for c in reader.connections)
+    except InputError:  # packed beyond all limits
+        raise
     except Exception:  # damaged bags make the library fail in any way; the walk then says what it finds
         return None
 
@@ -151,6 +156,7 @@ def open_whole(path: Path, stack: ExitStack) -> OpenBag | None:
         wanted = [connection for connection in reader.connections if connection.topic in names]
         if not wanted:
             return
+        current_unpacker.set(Unpacker(path))
         for connection, time_ns, raw in reader.messages(wanted):
             yield connection.topic, time_ns, _deserialized(reader.deserialize, raw, connection.msgtype)
 
@@ -187,7 +193,7 @@ class _Deserializer:
     """Deserializes by the definitions in a file, or by those of the latest ROS 2 where it has none."""
 
     def __init__(self, part: Salvage) -> None:
-        self._part = part
+        self._part, self._unpacker = part, Unpacker(part.path)
         self._stores: dict[str, Any] = {}
 
     def __call__(self, raw: bytes, topic: str) -> Any:
@@ -198,7 +204,7 @@ class _Deserializer:
         if self._part.encodings[topic] == "ros1":
             return store.deserialize_ros1(raw, msgtype)
         if raw[:4] == ZSTD:  # rosbag2 may pack each message; its first bytes then are no CDR header
-            raw, _ = unpack(raw, "zstd")
+            raw, _ = self._unpacker.unpack(raw, "zstd")
         return store.deserialize_cdr(raw, msgtype)
 
     def _store(self, topic: str) -> Any:
@@ -209,6 +215,8 @@ class _Deserializer:
 def _deserialized(deserialize: Callable[[bytes, str], Any], raw: bytes, key: str) -> Any:
     try:
         return deserialize(raw, key)
+    except InputError:  # packed beyond all limits
+        raise
     except Exception:  # whatever damaged bytes provoke
         return None
 

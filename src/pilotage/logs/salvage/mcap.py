@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 from pilotage.core.files import opened
 from pilotage.logs.salvage.found import MAGIC_OF, BagFormat, Raw, Salvage, damage_of
-from pilotage.logs.salvage.pieces import CutError, FileBytes, string, uint, unpack
+from pilotage.logs.salvage.pieces import CutError, FileBytes, string, uint
+from pilotage.logs.salvage.unpacking import Unpacker
 
 _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _DATA_END = 3, 4, 5, 6, 15
 
@@ -15,6 +16,7 @@ def walk_mcap(found: Salvage) -> Iterator[Raw]:
     """Yield the messages of an MCAP file; ``found`` learns on the way."""
     with opened(found.path, "a bag") as file:
         data = FileBytes(file)
+        unpacker = Unpacker(found.path)
         schemas: dict[int, tuple[str, str]] = {}
         channels: dict[int, str] = {}
         place, damaged, closed = len(MAGIC_OF[BagFormat.MCAP]), 0, False
@@ -27,7 +29,7 @@ def walk_mcap(found: Salvage) -> Iterator[Raw]:
             closed = op == _DATA_END  # what follows repeats what was there
             try:
                 if op == _CHUNK:
-                    unpacked, whole = _mcap_chunk(body)
+                    unpacked, whole = _mcap_chunk(body, unpacker)
                     damaged += not whole and end <= len(data)
                     yield from _mcap_records(unpacked, schemas, channels, found)
                 elif end <= len(data):
@@ -40,11 +42,11 @@ def walk_mcap(found: Salvage) -> Iterator[Raw]:
         )
 
 
-def _mcap_chunk(body: bytes) -> tuple[bytes, bool]:
+def _mcap_chunk(body: bytes, unpacker: Unpacker) -> tuple[bytes, bool]:
     size = uint(body, 28, 4)
     compression = body[32 : 32 + size].decode("ascii", "replace")
     start = 40 + size
-    return unpack(body[start : start + uint(body, start - 8, 8)], compression or "none")
+    return unpacker.unpack(body[start : start + uint(body, start - 8, 8)], compression or "none")
 
 
 def _mcap_records(

@@ -1,9 +1,7 @@
-"""Numbers, strings and packed chunks out of bytes that may end too early."""
+"""Numbers and strings out of bytes that may end too early."""
 
 from __future__ import annotations
 
-import bz2
-import importlib
 import os
 from typing import IO, Any
 
@@ -29,44 +27,6 @@ class FileBytes:
         first, end, _ = places.indices(self._size)
         self._file.seek(first)
         return self._file.read(max(0, end - first))
-
-
-def unpack(data: bytes, compression: str) -> tuple[bytes, bool]:
-    """Unpack a chunk as far as it goes.
-
-    Returns
-    -------
-    The bytes, and whether the chunk is whole as far as its packing tells.
-    """
-    if compression == "none":
-        return data, True
-    unpacker: Any
-    if compression == "bz2":
-        unpacker = bz2.BZ2Decompressor()
-    elif compression == "lz4":
-        unpacker = importlib.import_module("lz4.frame").LZ4FrameDecompressor()
-    elif compression == "zstd":
-        unpacker = _zstd().ZstdDecompressor()
-    else:
-        return b"", False
-    parts: list[bytes] = []
-    try:
-        # Piece by piece, so that what stands before a damaged byte is kept.
-        for start in range(0, len(data), 4096):
-            if unpacker.eof:
-                break
-            parts.append(unpacker.decompress(data[start : start + 4096]))
-    except Exception:  # each library has its own errors
-        return b"".join(parts), False
-    return b"".join(parts), bool(unpacker.eof)
-
-
-def _zstd() -> Any:
-    """Return zstd, which rosbags brings along below Python 3.14."""
-    try:
-        return importlib.import_module("compression.zstd")
-    except ImportError:
-        return importlib.import_module("backports.zstd")
 
 
 def uint(data: Any, place: int, size: int) -> int:

@@ -8,13 +8,15 @@ from typing import Any
 
 from pilotage.core.files import opened
 from pilotage.logs.salvage.found import MAGIC_OF, BagFormat, Raw, Salvage, damage_of
-from pilotage.logs.salvage.pieces import CutError, FileBytes, uint, unpack
+from pilotage.logs.salvage.pieces import CutError, FileBytes, uint
+from pilotage.logs.salvage.unpacking import Unpacker
 
 
 def walk_ros1(found: Salvage) -> Iterator[Raw]:
     """Yield the messages of a ROS 1 bag; ``found`` learns on the way."""
     with opened(found.path, "a bag") as file:
         data = FileBytes(file)
+        unpacker = Unpacker(found.path)
         names: dict[int, str] = {}
         place, damaged = len(MAGIC_OF[BagFormat.ROS1]), 0
         closed = False
@@ -29,7 +31,8 @@ def walk_ros1(found: Salvage) -> Iterator[Raw]:
             if op == b"\x03":  # the bag's header: without an index it was never closed
                 closed = header.get(b"index_pos", b"") != bytes(8)
             elif op == b"\x05":
-                unpacked, whole = unpack(body, header.get(b"compression", b"none").decode("ascii", "replace"))
+                packing = header.get(b"compression", b"none").decode("ascii", "replace")
+                unpacked, whole = unpacker.unpack(body, packing)
                 damaged += not whole and place < len(data)
                 yield from _ros1_chunk(unpacked, names, found)
         found.damage = damage_of(

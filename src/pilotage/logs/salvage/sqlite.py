@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import sqlite3
 from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
 
 from pilotage.core.files import read_bytes
 from pilotage.logs.salvage.found import Raw, Salvage, damage_of
@@ -12,6 +14,28 @@ STEPS = 100_000
 """Of SQLite's machine between two looks at how many it has taken."""
 MOST_A_BYTE = 10
 """Such steps for each byte of the file: a row takes a dozen of them, and ten bytes at least."""
+
+SHORT = 1_000_000
+"""Bytes that any statement may make in passing."""
+
+
+def require_tables(path: Path) -> None:
+    """Make sure that a database has nothing but tables of what is written in them, as rosbag2 makes it.
+
+    A view, a generated column or a virtual table can have values and rows without end.
+
+    Raises
+    ------
+    sqlite3.Error
+        Where it has others.
+    """
+    with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro&immutable=1", uri=True)) as base:
+        others = base.execute(
+            "SELECT EXISTS (SELECT 1 FROM pragma_table_list WHERE schema = 'main' AND type != 'table') "
+            "OR EXISTS (SELECT 1 FROM pragma_table_list t, pragma_table_xinfo(t.name) c WHERE c.hidden)"
+        )
+        if others.fetchone()[0]:
+            raise sqlite3.DatabaseError("not all of it is tables of what is written in them")
 
 
 def walk_sqlite(found: Salvage) -> Iterator[Raw]:
@@ -54,9 +78,12 @@ def _sqlite_rows(data: bytes, found: Salvage) -> Iterator[Raw]:
     try:
         base.set_progress_handler(has_too_much, STEPS)
         base.deserialize(data)
+        # No value is longer than the file that it stands in, nor all of them: else they are made up.
+        base.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, max(len(data), SHORT))
         # Without this, a file shorter than its header says is refused as a whole.
         base.execute("PRAGMA writable_schema=ON")
         names: dict[int, str] = {}
+        room = len(data)
         for number, topic, msgtype, form in base.execute(
             "SELECT id, name, type, serialization_format FROM topics"
         ):
@@ -65,6 +92,9 @@ def _sqlite_rows(data: bytes, found: Salvage) -> Iterator[Raw]:
                 found.learn(topic, msgtype, str(form), "")
         for number, stamp, raw in base.execute("SELECT topic_id, timestamp, data FROM messages NOT INDEXED"):
             if number in names and isinstance(raw, bytes):
+                room -= len(raw)
+                if room < 0:
+                    raise sqlite3.DataError("more in its messages than in the file")
                 yield names[number], int(stamp), raw
     finally:
         base.close()

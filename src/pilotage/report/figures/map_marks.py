@@ -9,9 +9,9 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from pilotage.records.run_data import RunData
-from pilotage.report.event_kinds import event_kind
 from pilotage.report.figures import layers
 from pilotage.report.figures.badge import RADIUS_PT, badge
+from pilotage.report.figures.event_marks import event_places
 from pilotage.report.figures.placing import LabelPlacer, along
 from pilotage.report.style import BLUE, GREEN, MUTED
 
@@ -92,42 +92,15 @@ def draw_events(
     axes: Axes, run: RunData, placer: LabelPlacer, points_per_m: float, of: Collection[int] | None = None
 ) -> None:
     """Mark where events happened, all or those ``of`` some indices; those at one place share a badge."""
-    clusters: list[tuple[float, float, list[int], str]] = []
-    for index, event in enumerate(run.events, start=1):
-        kind = event_kind(event.kind)
-        asked = of is None or index - 1 in of
-        place = place_at(run, event.t_s) if asked and kind.on_map else None
-        if place is None:
-            continue
-        x, y = place[0] * points_per_m, place[1] * points_per_m
-        near = next(
-            (c for c in clusters if math.hypot(c[0] - x, c[1] - y) < 7.0 and c[3] == kind.colour), None
-        )
-        if near is None:
-            clusters.append((x, y, [index], kind.colour))
-        else:
-            near[2].append(index)
-    for x, y, numbers, colour in clusters:
-        text = _ranges(numbers)
+    for place in event_places(run, points_per_m, of):
+        text, x, y = place.text, place.x_m * points_per_m, place.y_m * points_per_m
         half_width = RADIUS_PT if len(text) <= 2 else 2.6 * len(text)
         reach = np.array([9.0, 15.0, 22.0, 32.0, 45.0])
         badge_x, badge_y = placer.place(x, y, half_width + 1.0, RADIUS_PT + 1.0, reach)
         leader = np.array([(x, y), (badge_x, badge_y)]) / points_per_m
-        layers.line(axes, leader, "events", color=colour, linewidth=0.8, zorder=18)
-        axes.plot(*leader[:1].T, "o", color=colour, markersize=4.0, markeredgecolor="white", zorder=19)
-        badge(axes, badge_x / points_per_m, badge_y / points_per_m, text, colour)
-
-
-def _ranges(numbers: list[int]) -> str:
-    """Write numbers short: 3–5, 9; only the first and the last where there are many."""
-    runs: list[list[int]] = []
-    for number in numbers:
-        if runs and number == runs[-1][-1] + 1:
-            runs[-1].append(number)
-        else:
-            runs.append([number])
-    texts = [str(part[0]) if len(part) == 1 else f"{part[0]}–{part[-1]}" for part in runs]
-    return ", ".join(texts) if len(texts) <= 3 else f"{texts[0]} … {texts[-1]}"
+        layers.line(axes, leader, "events", color=place.colour, linewidth=0.8, zorder=18)
+        axes.plot(*leader[:1].T, "o", color=place.colour, markersize=4.0, markeredgecolor="white", zorder=19)
+        badge(axes, badge_x / points_per_m, badge_y / points_per_m, text, place.colour)
 
 
 def draw_beacons(axes: Axes, run: RunData, placer: LabelPlacer, points_per_m: float) -> None:
@@ -173,14 +146,3 @@ def draw_beacons(axes: Axes, run: RunData, placer: LabelPlacer, points_per_m: fl
             zorder=8.3,
         )
         label.set_gid("layer-beacons")
-
-
-def place_at(run: RunData, t_s: float) -> tuple[float, float] | None:
-    """Return where the robot truly was at a time, or where it believed to be, or None."""
-    if not run.trace.steps or not math.isfinite(t_s):
-        return None
-    step = min(int(np.searchsorted(run.trace.t_s, t_s)), run.trace.steps - 1)
-    for path in (layers.true_path(run), layers.estimated_path(run)):
-        if bool(np.isfinite(path[step]).all()):
-            return float(path[step, 0]), float(path[step, 1])
-    return None

@@ -10,6 +10,7 @@ from pilotage.core.types import FloatArray
 from pilotage.records.run_data import RunData
 from pilotage.report.event_kinds import event_kind
 from pilotage.report.figures.badge import RADIUS_PT, badge
+from pilotage.report.figures.event_marks import event_lines
 from pilotage.report.modes import MODES, Mode, mode_spans
 from pilotage.report.style import (
     BLUE,
@@ -31,7 +32,7 @@ TITLE = "What happened and when"
 MOST_ROWS = 6
 _ROW_PT = 2.0 * RADIUS_PT + 3.0
 _MODE_PT = 13.0
-_WIDTH_PT, _NARROW_PT = 660.0, 0.2
+_WIDTH_PT = 660.0
 
 
 def timeline_figure(run: RunData) -> Illustration:
@@ -97,19 +98,10 @@ def _events(axes: Axes, below: Axes, run: RunData, rows: list[int]) -> None:
     axes.spines[["left", "bottom"]].set_visible(False)
     if not run.events:
         note(axes, "nothing out of the ordinary")
-    # Of lines that nobody could tell apart one is drawn: a run may have thousands of events.
-    narrow_s = max(float(np.ptp(run.trace.t_s)), 1e-9) * _NARROW_PT / _WIDTH_PT
-    drawn: set[tuple[str, int]] = set()
+    event_lines(below, run)
     for index, (event, row) in enumerate(zip(run.events, rows, strict=True), start=1):
-        colour = event_kind(event.kind).colour
-        if not np.isfinite(event.t_s):
-            continue
-        place = colour, round(min(max(event.t_s / narrow_s, -1e9), 1e9))
-        if place not in drawn:
-            drawn.add(place)
-            below.axvline(event.t_s, color=colour, linewidth=0.6, alpha=0.7)
-        if row >= 0:
-            badge(axes, event.t_s, row + 0.5, str(index), colour)
+        if row >= 0 and np.isfinite(event.t_s):
+            badge(axes, event.t_s, row + 0.5, str(index), event_kind(event.kind).colour)
 
 
 def _modes(axes: Axes, used: list[tuple[Mode, FloatArray]]) -> None:

@@ -57,6 +57,12 @@ def sheet_panels(
     return figure, panels
 
 
+def points_per_m(axes: Axes) -> float:
+    """Return a panel's scale on the page."""
+    left, right = axes.get_xlim()
+    return float(axes.get_position().width) * WIDTH_PT / (right - left)
+
+
 def fill_cells(
     axes: Axes,
     sheet: SheetData,

@@ -12,11 +12,10 @@ from pilotage.records.cells import SheetData
 from pilotage.records.numbers import number
 from pilotage.records.run_data import RunData
 from pilotage.report import quantities
-from pilotage.report.event_kinds import event_kind
 from pilotage.report.figures import layers
 from pilotage.report.figures.badge import badge
-from pilotage.report.figures.map_marks import place_at
-from pilotage.report.sheet.panels import draw_grid, draw_things, fill_cells, sheet_panels
+from pilotage.report.figures.event_marks import event_lines, event_places
+from pilotage.report.sheet.panels import draw_grid, draw_things, fill_cells, points_per_m, sheet_panels
 from pilotage.report.style import (
     BLUE,
     GREEN,
@@ -55,10 +54,8 @@ def path_figure(run: RunData) -> Illustration:
     figure, (axes,) = sheet_panels(sheet, [""])
     draw_path(axes, run, sheet)
     trace = run.trace
-    for count, event in enumerate(run.events, start=1):
-        kind, place = event_kind(event.kind), place_at(run, event.t_s)
-        if kind.on_map and place is not None:
-            badge(axes, *place, str(count), kind.colour)
+    for place in event_places(run, points_per_m(axes)):
+        badge(axes, place.x_m, place.y_m, place.text, place.colour)
     overhang = trace["overhang_m"]
     over = float(np.nanmax(overhang)) if trace.has("overhang_m") else math.nan
     caption = (
@@ -104,10 +101,7 @@ def coverage_figure(run: RunData) -> Illustration:
             count = np.searchsorted(first, t_s + 1e-9, side="right")
             series(panels[0], t_s, 100.0 * count / of, colour, linewidth=1.6)
     panels[0].axhline(100.0 * DONE_SHARE, color=MUTED, linewidth=0.8, linestyle=(0, (4.0, 3.0)))
-    for event in run.events:
-        kind = event_kind(event.kind)
-        if math.isfinite(event.t_s):
-            panels[0].axvline(event.t_s, color=kind.colour, linewidth=0.6, alpha=0.7)
+    event_lines(panels[0], run)
     error = 1000.0 * np.hypot(*(layers.estimated_path(run) - layers.true_path(run)).T)
     series(panels[1], t_s, error, INK)
     panels[1].set_ylim(0.0, 1.1 * float(np.nanmax(np.append(error, 1.0))))
