@@ -3,8 +3,12 @@
 import numpy as np
 import pytest
 
+from pilotage.core.errors import InputError
 from pilotage.core.random import RandomStreams
 from pilotage.core.types import Command, Twist, WheelSpeeds
+from pilotage.experiments.build.build import build
+from pilotage.experiments.loop import run_loop
+from pilotage.experiments.mission import mission_of
 from pilotage.models.motion.bicycle import BicycleConfig
 from pilotage.models.motion.differential_drive import DifferentialDriveConfig
 from pilotage.models.motion.motion import MotionConfig
@@ -15,6 +19,7 @@ from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 from pilotage.sim.bodies.motion import SIMULATED_MOTIONS
 from pilotage.stack.localization.command_error import CommandError
 from pilotage.stack.localization.commanded_motion import CommandedMotion
+from support.missions import SMALL_VAR, reach
 
 DT_S = 0.05
 EXACT = WheelErrorsConfig(
@@ -87,3 +92,34 @@ def test_who_does_not_answer_goes_on_as_it_went() -> None:
     for _ in range(20):
         error.tell(OdometryIncrement(0.1, 0.04), np.zeros(3), 0.2)
     assert error.rates == pytest.approx([0.5, 0.0, 0.2], rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("localizer", "sensors", "most_m"),
+    [
+        (
+            "ekf-gps",
+            {"gps": {"name": "gps", "position_std_m": 0.1, "bias_std_m": 0.1}, "compass": "compass"},
+            0.6,
+        ),
+        ("ekf-walls", {"lidar": {"name": "lidar", "beams": 180}}, 0.1),
+        ("ekf-landmarks", {"beacons": "beacons"}, 0.2),
+    ],
+)
+def test_a_car_without_odometry_reckons_by_its_commands(
+    localizer: str, sensors: dict[str, object], most_m: float
+) -> None:
+    """It was refused, though it senses where it is."""
+    robot = {"footprint": {"radius_m": 0.3}, "motion": "bicycle", "sensors": sensors}
+    stack = {"initial": SMALL_VAR, "localizer": localizer}
+    stack["navigator"] = {"name": "open-loop", "speed_m_s": 0.5, "turn_rate_rad_s": 0.2, "duration_s": 8.0}
+    values = reach(robot=robot, stack=stack, task="drive")
+    run = run_loop(build(mission_of(values, seed=3))).finished
+    trace = run.robots[0].trace
+    off_m = np.hypot(trace["true_x_m"] - trace["est_x_m"], trace["true_y_m"] - trace["est_y_m"])
+    assert run.robots[0].driven_m > 3.0
+    assert off_m.max() < most_m
+    assert run.events[0].kind == "no-odometry"
+    values["stack"]["localizer"] = "dead-reckoning"
+    with pytest.raises(InputError, match="expected one wheel-odometry among"):
+        build(mission_of(values))

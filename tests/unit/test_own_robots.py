@@ -293,4 +293,6 @@ def test_a_goal_too_near_a_wall_for_the_disc_says_who_drives_the_outline(
 def test_a_sensor_that_is_missing_is_called_by_the_name_that_a_mission_has_for_it() -> None:
     """It was called by its class: WheelOdometry."""
     with pytest.raises(pl.InputError, match="expected one wheel-odometry among"):
-        pl.run(pl.load("museum-walls", set={"robot.sensors.odometry": None}))
+        pl.run(
+            pl.load("museum-walls", set={"robot.sensors.odometry": None, "stack.localizer": "dead-reckoning"})
+        )

@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pilotage.evaluation.metric import words_and_unit
+from pilotage.experiments.studies.cells import show
 from pilotage.report.study.scales import Scale, p_value, scale_of, told
 
 
@@ -79,3 +80,20 @@ def test_small_variances_are_short_and_rounding_is_none() -> None:
     assert scale.write_variance(4.7e-5, 0.08) == "4.70 · 10⁻⁵"
     assert scale.write_variance(1.08e-23, 1.0) == "0"
     assert scale.write_variance(0.0, 0.0) == "0"
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (None, "null"),
+        (True, "true"),
+        (0.1 + 0.2, "0.3"),
+        (1, "1"),
+        ("off", "off"),
+        ({"name": "slam", "known": False}, "{name: slam, known: false}"),
+        ([0.5, None], "[0.5, null]"),
+    ],
+)
+def test_a_value_is_called_what_a_mission_file_calls_it(value: object, text: str) -> None:
+    """Cells were called ``mapper=None`` and ``known=True``, which no mission file understands."""
+    assert show(value) == text

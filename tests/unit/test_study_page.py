@@ -382,7 +382,8 @@ def test_a_line_over_a_factor_may_have_lists_and_mappings_beside_it() -> None:
     ]
     view = made_up(cells, ("position_rmse_m",), lambda c, t, _: 1.0 + c.index + 0.1 * t, None)
     lines = lines_over(view, view.cells, "gate")
-    assert sorted(name for name, _ in lines) == sorted(map(str, beside))
+    names = ["pair [1, 2]", "pair [2, 3]", "pair null", "pair {gain: 1}"]
+    assert sorted(name for name, _ in lines) == names
     assert all(len(line) == 2 for _, line in lines)
     study_page(view)
 

@@ -372,6 +372,25 @@ class TestTask:
         assert not metrics["success"]
         assert str(metrics["reason"]).startswith("swept ")
 
+    @pytest.mark.parametrize("points_m", [[[0.4, 0], [-0.2, 0.25], [-0.2, -0.25]]])
+    def test_an_outline_is_given_the_room_that_its_turns_take(self, points_m: list[list[float]]) -> None:
+        """It was planned for the planner's clearance, less than the outline's radius, and fitted nowhere."""
+        values = copy.deepcopy(MISSIONS["sweep-floor"])
+        values["robot"]["footprint"] = {"points_m": points_m}
+        experiment = build(mission_of(values, seed=0))
+        metrics = experiment.task.judge(run_loop(experiment).finished).metrics
+        assert metrics["success"], metrics["reason"]
+        assert metrics["collisions"] == 0
+
+    def test_who_cannot_turn_on_the_spot_is_told_who_can(self) -> None:
+        """It was told to take a planner that sweeps nothing, after the sweep had been planned."""
+        values = copy.deepcopy(MISSIONS["sweep-floor"])
+        values["robot"]["motion"] = {"name": "bicycle", "wheelbase_m": 0.4}
+        with pytest.raises(
+            InputError, match=r"turns on the spot.*take robot\.motion\.name: differential-drive"
+        ):
+            build(mission_of(values))
+
     def test_passes_wider_than_what_they_sweep_are_refused(self) -> None:
         """``task.width_m`` alone was driven to the end, with floor unswept between any two passes."""
         values = {**MISSIONS["sweep-floor"], "task": {"name": "sweep-floor", "width_m": 0.4}}

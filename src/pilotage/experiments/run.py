@@ -8,6 +8,7 @@ from pathlib import Path
 
 from pilotage.evaluation.finished import Verdict
 from pilotage.evaluation.metrics.computed import add_computed
+from pilotage.evaluation.out_of_time import told_why
 from pilotage.experiments.build.build import Experiment, build
 from pilotage.experiments.leavings import files_of
 from pilotage.experiments.loop import Run, run_loop
@@ -69,7 +70,7 @@ def run_mission(
 
 def judge(experiment: Experiment, run: Run) -> Verdict:
     """The task's verdict, with the metrics that were registered from outside."""
-    verdict = experiment.task.judge(run.finished)
+    verdict = told_why(experiment.task.judge(run.finished), run.finished)
     verdict.metrics["success"] = bool(verdict.metrics["success"])
     add_computed(verdict.metrics, run.finished)
     return verdict

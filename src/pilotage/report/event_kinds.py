@@ -36,6 +36,7 @@ _KINDS = {
     "close": EventKind("goes back to close a loop", PURPLE, True),
     "stall": EventKind("gives a place up", ORANGE, True),
     "explored": EventKind("nothing left to explore", GREEN, True),
+    "no-odometry": EventKind("no odometry", ORANGE, False),
     "cut-off": EventKind("floor left out", ORANGE, False),
     "obstacle-mapped": EventKind("obstacle mapped", MUTED, False),
 }

@@ -28,6 +28,10 @@ from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.localization.between_increments import BetweenIncrements, in_between
 from pilotage.stack.localization.commanded_motion import CommandedStack
+from pilotage.stack.localization.commanded_odometry import (
+    CommandReckoningStack,
+    with_commanded_odometry,
+)
 from pilotage.stack.localization.heading_filter import HEADING_FILTERS, HeadingEstimate, HeadingFilter
 from pilotage.stack.localization.localizer import LOCALIZERS, Localizer
 from pilotage.stack.mapping.mapper import MAPPERS
@@ -123,6 +127,7 @@ def build_stack(
     if "explorer" in oracles and truth is not None:
         return knowing_explorer(robot, task, truth, journal)
     robot, join = with_joint_lidar(robot)
+    robot, reckoned = with_commanded_odometry(robot, config.localizer, journal)
     localizer = _localizer(config, robot, chart, task, journal, truth, oracles)
     parts = Parts(
         localizer=localizer,
@@ -145,6 +150,7 @@ def build_stack(
     watched = parts.localizer
     stack = WatchedStack(stack, watched.watched) if isinstance(watched, WatchedLocalizer) else stack
     stack = CommandedStack(stack, localizer.commanded) if isinstance(localizer, BetweenIncrements) else stack
+    stack = stack if reckoned is None else CommandReckoningStack(stack, reckoned)
     return stack if join is None else JoiningStack(stack, join)
 
 

@@ -152,8 +152,14 @@ def _cell(
 
 
 def show(value: Any) -> str:
-    """A value in a cell's name."""
-    return f"{value:.12g}" if isinstance(value, float) else value if isinstance(value, str) else f"{value}"
+    """A value in a cell's name, as a mission file has it: ``null``, ``true``, ``{name: slam}``."""
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{key}: {show(inner)}" for key, inner in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(show, value)) + "]"
+    if value is None or isinstance(value, bool):
+        return {None: "null", True: "true", False: "false"}[value]
+    return f"{value:.12g}" if isinstance(value, float) else f"{value}"
 
 
 def _times(base: Any, factor: float, key: str) -> Any:

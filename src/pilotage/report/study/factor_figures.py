@@ -15,7 +15,7 @@ from pilotage.core.types import FloatArray
 from pilotage.evaluation.intervals import Summary
 from pilotage.evaluation.judge import Judgement
 from pilotage.evaluation.metric import words_and_unit
-from pilotage.experiments.studies.cells import Cell
+from pilotage.experiments.studies.cells import Cell, show
 from pilotage.experiments.studies.groups import CellGroup
 from pilotage.experiments.studies.table import StudyTable
 from pilotage.report.light_axes import LightAxes
@@ -82,7 +82,10 @@ def lines_over(table: StudyTable, cells: Sequence[Cell], factor: str) -> list[Li
     differing = [i for i in range(len(others)) if len({key[i] for key in kept}) > 1]
     if len(kept) == 1:
         return [("mean with its 95 % interval", next(iter(kept.values())))]
-    names = [", ".join(_said(table, others[i], key[i]) for i in differing) for key in kept]
+    names = [
+        ", ".join(_said(table, others[i], line[0].values.get(others[i])) for i in differing)
+        for line in kept.values()
+    ]
     return list(zip(names, kept.values(), strict=True))[: len(COLOURS)]
 
 
@@ -93,8 +96,10 @@ def _kept_apart(value: object) -> float | str:
 
 def _said(table: StudyTable, factor: str, value: object) -> str:
     """A factor's value with its name and its unit; a level or a configuration by its own name."""
+    if isinstance(value, str):
+        return value
     if not _is_number(value):
-        return str(value)
+        return f"{words_and_unit(factor)[0]} {show(value)}"
     unit = table.unit(factor)
     return f"{words_and_unit(factor)[0]} {value:g}{f' {unit}' if unit else ''}"
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -79,6 +80,8 @@ class EkfGpsLocalizer:
     Fails where the heading is uncertain by more than half a radian (and says so), and needs a pose to begin
     with. It never becomes surer of its place than the receiver's lasting error lets it.
     """
+
+    BY_COMMANDS: ClassVar[bool] = True
 
     def __init__(
         self,

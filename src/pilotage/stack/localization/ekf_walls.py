@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import ClassVar
 
 from pydantic import Field
 
@@ -84,6 +85,8 @@ class EkfWallsLocalizer:
     Fails where walls run in one direction only (the pose along them is dead reckoning then), and in a map
     that repeats itself farther than the robot sees.
     """
+
+    BY_COMMANDS: ClassVar[bool] = True
 
     def __init__(
         self,

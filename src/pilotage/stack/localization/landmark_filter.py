@@ -105,6 +105,8 @@ class LandmarkFilter:
 
     NAME: ClassVar[str]
 
+    BY_COMMANDS: ClassVar[bool] = True
+
     def __init__(
         self,
         config: LandmarkFilterConfig,

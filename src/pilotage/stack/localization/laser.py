@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 from pilotage.core.config import Config
 from pilotage.maps.world_map import WorldMap
 from pilotage.stack.interface import Belief
@@ -27,6 +29,8 @@ class LaserLocalizer(WrappedLocalizer):
     wall filter would be lost or too sure of itself among them; where walls are lines it is the sharper of
     both, at a third of the time. Fails where the filter that it takes does.
     """
+
+    BY_COMMANDS: ClassVar[bool] = True
 
     def __init__(
         self,

@@ -24,6 +24,9 @@ class Localizer(Protocol):
     declares its telemetry in the journal at construction and tells it at every step; an update that it can
     explain it puts into ``journal.update``.
 
+    One that senses enough to correct what a robot's commands foretell says ``BY_COMMANDS = True`` on its
+    class: a robot without wheel odometry then has one by its commands.
+
     What it may have besides stands in ``Abilities``, by the same names; whether it has is asked once, when
     the stack is put together.
     """

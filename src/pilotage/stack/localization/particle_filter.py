@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import scipy
@@ -122,6 +122,8 @@ class ParticleFilterLocalizer:
     no place while several look alike. Fails where the belief is no single hump: the spreading keeps mean and
     covariance, and would draw two humps together.
     """
+
+    BY_COMMANDS: ClassVar[bool] = True
 
     def __init__(
         self,

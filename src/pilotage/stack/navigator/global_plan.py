@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, Goal, Pose2
 from pilotage.kernels.geometry import plane
 from pilotage.kernels.rrt import hybrid
@@ -92,6 +93,14 @@ class GlobalPlan:
         self.turns_first = False
         self._least_clearance_m = least_clearance_m
         self._planner = planner
+        self.turns_on_the_spot = as_planned and getattr(planner, "TURNS_ON_THE_SPOT", False)
+        least_m = 0.0 if robot is None else robot.motion.least_turning_radius_m
+        if self.turns_on_the_spot and least_m > 0.0:
+            raise InputError(
+                "planner: expected a motion that turns on the spot, as the planned path does at its "
+                f"corners, found one that turns in {least_m:.2f} m at least; take robot.motion.name: "
+                "differential-drive"
+            )
         outline = None if robot is None else robot.footprint
         self._beside_m = outline_clearance_m(planner, outline, as_planned)
         self._smoother = smoother
@@ -109,7 +118,8 @@ class GlobalPlan:
         """What the planner keeps of its own accord; from the centre at least what the body needs."""
         if self._beside_m is not None:
             return self._beside_m
-        return max(self._planner.clearance_m, self._least_clearance_m)
+        turning_m = self._robot.radius_m if self.turns_on_the_spot and self._robot is not None else 0.0
+        return max(self._planner.clearance_m, self._least_clearance_m, turning_m)
 
     @property
     def beside_outline(self) -> bool:
@@ -198,12 +208,15 @@ class GlobalPlan:
                 return last[0], None
             enough_m = last[1].length_m + detours.wider_m
         found: _Found | None = None
+        no_better_m = -math.inf
         for clearance_m in clearances_m:
+            if clearance_m <= no_better_m:
+                continue
             at_last = last if clearance_m == clearances_m[-1] else None
             result, path = at_last or self._at(start, goal, field, clearance_m)
             if path is None:
                 if self.hopeless:
-                    break
+                    no_better_m = clearance_m
                 continue
             if found is None or self._is_worth(path, found.path, mapped_m, detours):
                 found = _Found(result, path, clearance_m)

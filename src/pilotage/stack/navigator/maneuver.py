@@ -196,15 +196,20 @@ class ManeuverNavigator(LocalizingNavigator):
     def _clearances_m(self) -> list[float]:
         """Clearances to try in turn: the planner's own, and less.
 
-        A path that is planned for the centre has to keep at least what the outline's inner disc needs; one
-        that is planned for the outline keeps its clearance beside it.
+        A path that is planned for the centre has to keep at least what the outline's inner disc needs, and
+        where its corners need more than that and than the planner's own, the disc around it; one that is
+        planned for the outline keeps its clearance beside it.
         """
-        full, outline = self._plan.clearance_m, self._robot.footprint
-        inner_m = outline.inner_radius_m
-        tried = [0.6 * full, 0.3 * full, 0.0]
-        if not self._plan.beside_outline:
+        plan, outline = self._plan, self._robot.footprint
+        full, inner_m = plan.clearance_m, outline.inner_radius_m
+        if plan.turns_on_the_spot:
+            return sorted({full, outline.radius_m}, reverse=True)
+        tried, wider = [0.6 * full, 0.3 * full, 0.0], []
+        if not plan.beside_outline:
             tried = [outline.radius_m, *(inner_m + margin for margin in BESIDE_INNER_M)]
-        return [full, *sorted({clearance for clearance in tried if clearance < full}, reverse=True)]
+            wider = [outline.radius_m] if outline.radius_m > full else []
+        less = sorted({clearance for clearance in tried if clearance < full}, reverse=True)
+        return [full, *wider, *less]
 
     def step(self, readings: Readings) -> Twist:
         """Localize, move the reference on, and follow it."""

@@ -66,6 +66,7 @@ class BoustrophedonPlanner:
     """
 
     TAKES_LONG: ClassVar[bool] = True
+    TURNS_ON_THE_SPOT: ClassVar[bool] = True
 
     def __init__(self, config: BoustrophedonConfig) -> None:
         self._config = config

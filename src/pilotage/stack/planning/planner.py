@@ -146,8 +146,9 @@ class Planner(Protocol):
     the outline itself, or plans backwards, says so by a class attribute ``FOR_OUTLINE = True``. One that can
     do either has a method ``outline_clearance_m(footprint)``, and is told by ``PlanRequest.beside_outline``.
     One that takes seconds and more, beside which loading what is compiled takes nothing, says
-    ``TAKES_LONG = True``: no run is rehearsed with it. One over cells, as navigator ``curve`` asks for, has
-    ``search`` besides and is registered with ``GRID_PLANNERS``, too.
+    ``TAKES_LONG = True``: no run is rehearsed with it. One whose path is for its very lines, so that nobody
+    may round their corners, says ``TURNS_ON_THE_SPOT = True``. One over cells, as navigator ``curve`` asks
+    for, has ``search`` besides and is registered with ``GRID_PLANNERS``, too.
     """
 
     @property
