@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,7 @@ from pilotage.stack.control.give_way import GiveWay, GiveWayConfig
 from pilotage.stack.control.make_room import MakeRoom, MakeRoomConfig
 from pilotage.stack.interface import Belief
 from pilotage.stack.knowledge import RobotKnowledge
+from pilotage.stack.navigator.goal.escaping import Waiting
 from pilotage.stack.perception.movers import Movers, MoversConfig
 from pilotage.stack.perception.moving_bodies import MovingBodies, MovingBodiesConfig
 
@@ -264,6 +266,27 @@ def test_who_has_corners_makes_room_only_where_they_touch_nothing_as_it_turns(be
     command = makes_room.step(0.0, Pose2(0.0, 0.0, 0.0), np.array([[0.0, beside_m, 0.03]]))
     assert command is not None
     assert (command == STOP) == (beside_m < 0.5)
+
+
+@pytest.mark.parametrize(("y_m", "turns"), [(5.6, True), (5.66, False)])
+def test_who_has_corners_waits_without_turning_them_into_a_wall(y_m: float, turns: bool) -> None:
+    """Squeezed up to a wall's end, it turned to look around while it waited, and its corner met the wall."""
+    corners = np.array([[0.3, 0.2], [-0.3, 0.2], [-0.3, -0.2], [0.3, -0.2]])
+    robot = replace(ROBOT, footprint=Footprint.polygon(corners))
+    bodies = MovingBodies(MovingBodiesConfig(), robot, CHART)
+    makes_room = MakeRoom(MakeRoomConfig(), robot, CHART.field, bodies)
+    place = Pose2(0.0, y_m, 0.0)
+    context: Any = SimpleNamespace(
+        map_what_is_new=lambda *_: None,
+        t_s=0.0,
+        mode=None,
+        turn_rate_rad_s=0.8,
+        may_turn=lambda pose: makes_room.may_turn(pose, NOTHING),
+        waits=lambda *_: False,
+    )
+    belief = Belief(place, np.eye(3))
+    move = Waiting(context, context, 1.0).step(Readings(0.0), belief)
+    assert (move.command != STOP) == turns
 
 
 def test_what_has_stood_for_long_is_a_thing_until_it_moves() -> None:

@@ -90,7 +90,7 @@ class MakeRoom:
             return None
         off_rad = wrap_to_pi(math.atan2(dy, dx) - pose.theta_rad)
         turn = min(max(TURN_GAIN_PER_S * off_rad, -self._rate_rad_s), self._rate_rad_s)
-        if self._has_corners and not self._may_turn(pose, mapped_m):
+        if not self.may_turn(pose, mapped_m):
             return STOP
         if abs(off_rad) > AHEAD_RAD:
             return Twist(0.0, turn)
@@ -98,8 +98,10 @@ class MakeRoom:
         free, _ = self._looked_at(pose, mapped_m, ahead, min(away_m, 3.0 * STEP_M))
         return Twist(self._speed_m_s if free.all() else 0.0, turn)
 
-    def _may_turn(self, pose: Pose2, mapped_m: FloatArray) -> bool:
-        """Whether nothing and nobody is within the disc around the robot."""
+    def may_turn(self, pose: Pose2, mapped_m: FloatArray) -> bool:
+        """Whether it has no corners, or nothing and nobody is within the disc around it."""
+        if not self._has_corners:
+            return True
         discs = np.concatenate([mapped_m, self._bodies.foretold(NOW_S, 1, pose, mapped_m, self._radius_m)[0]])
         gaps_m = np.hypot(discs[:, 0] - pose.x_m, discs[:, 1] - pose.y_m) - discs[:, 2]
         to_wall_m = self._field.at(np.array([[pose.x_m, pose.y_m]]))[0]

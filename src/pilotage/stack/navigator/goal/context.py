@@ -196,6 +196,10 @@ class Context:
         """Whether a place aside is any better than to stand here."""
         return self.make_room.helps(pose, self.own_map.found_circles_m)
 
+    def may_turn(self, pose: Pose2) -> bool:
+        """Whether it turns on the spot, here without touching anything."""
+        return self.turns_on_the_spot and self.make_room.may_turn(pose, self.own_map.found_circles_m)
+
     def out_of_patience(self, pose: Pose2) -> int:
         """How often in a row it has now waited for long in one place; 0 while it still has patience."""
         if self._waits_s is None or self.t_s - self._waits_s < self.config.give_way.patience_s:

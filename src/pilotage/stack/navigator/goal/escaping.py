@@ -74,7 +74,7 @@ class Waiting:
         context.map_what_is_new(readings, belief)
         context.mode = Mode.WAIT
         if context.t_s < self.until_s:
-            turn = Twist(0.0, context.turn_rate_rad_s if context.turns_on_the_spot else 0.0)
+            turn = Twist(0.0, context.turn_rate_rad_s if context.may_turn(pose) else 0.0)
             return Move(self, STOP if context.waits(turn, pose) else turn)
         result = context.make_plan(pose, context.clearances_m(pose))
         if result.path is not None:
