@@ -175,3 +175,10 @@ def test_an_explorer_needs_its_encoders_once(explorer: Any, config: Any, count: 
     told = ToldOfSheet(sensors=others | {f"encoders-{k}": WheelEncodersConfig() for k in range(count)})
     with pytest.raises(InputError, match=f"expected one wheel-encoders among robot.sensors, found {count}"):
         told.explorer(explorer, config)
+
+
+def test_cells_too_small_to_look_at_are_refused() -> None:
+    """A beam was followed in steps of a fraction of a cell of 40 fm."""
+    with pytest.raises(ValueError, match=r"expected cells at least 0\.001 m wide, found 1e-12 m for 25"):
+        SheetFile(size_m=(1e-12, 4.0))
+    SheetFile(size_m=(0.025, 4.0))

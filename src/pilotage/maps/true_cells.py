@@ -8,7 +8,7 @@ from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from pilotage.core.config import Config, validate
 from pilotage.core.files import read_yaml
@@ -16,6 +16,8 @@ from pilotage.maps.cell_map import CellMap, CellState, TrueCellMap
 from pilotage.maps.cell_map_text import features_only, read_cell_map
 
 Floats = NDArray[np.float64]
+LEAST_CELL_M = 1e-3
+"""Cells' sides; what looks along a beam looks at every fraction of one."""
 Positive = Annotated[float, Field(gt=0.0)]
 Count = Annotated[int, Field(ge=1, le=1000)]
 Point = tuple[float, float]
@@ -32,6 +34,16 @@ class SheetFile(Config):
     """Boxes along the axes: x0, y0, x1, y1."""
     lines: tuple[Annotated[tuple[Point, ...], Field(min_length=2)], ...] = ()
     """Tapes: the corners of each centre line."""
+
+    @model_validator(mode="after")
+    def _cells_have_a_size(self) -> SheetFile:
+        for name, size_m, count in zip(("wide", "high"), self.size_m, self.cells, strict=True):
+            if size_m < LEAST_CELL_M * count:
+                raise ValueError(
+                    f"size_m: expected cells at least {LEAST_CELL_M:g} m {name}, "
+                    f"found {size_m:g} m for {count}"
+                )
+        return self
 
 
 def read_true_map(path: str | Path) -> TrueCellMap:

@@ -37,6 +37,28 @@ def mark_obstacle(states: States, row: int, column: int, margin: int) -> None:
 
 
 @kernel
+def _on_sheet(
+    x: float, y: float, step_x: float, step_y: float, count: int, width: float, height: float
+) -> tuple[int, int]:
+    """The k from 0 to below ``count`` of which (x + k step_x, y + k step_y) may lie on a sheet: first, end.
+
+    A sensor far beyond the sheet would be followed there point by point.
+    """
+    low, high = 0.0, float(count)
+    for at, by, most in ((x, step_x, width), (y, step_y, height)):
+        if by == 0.0:
+            if at < 0.0 or at > most:
+                return 0, 0
+            continue
+        first, last = min(-at / by, (most - at) / by) - 1.0, max(-at / by, (most - at) / by) + 2.0
+        if first > low:
+            low = first
+        if last < high:
+            high = last
+    return (int(low), math.ceil(high)) if low < high else (0, 0)
+
+
+@kernel
 def mark_beam(
     states: States,
     x: float,
@@ -68,11 +90,16 @@ def mark_beam(
     """
     end_row = math.floor((mount_y + length * math.sin(theta)) / cell_height)
     end_column = math.floor((mount_x + length * math.cos(theta)) / cell_width)
+    width, height = states.shape[1] * cell_width, states.shape[0] * cell_height
     under = math.hypot(mount_x - x, mount_y - y)
-    for k in range(math.ceil(under / step)):
+    along_x, along_y = step / under * (mount_x - x), step / under * (mount_y - y)
+    begin, end = _on_sheet(x, y, along_x, along_y, math.ceil(under / step), width, height)
+    for k in range(begin, end):
         px, py = x + k * step / under * (mount_x - x), y + k * step / under * (mount_y - y)
         mark(states, math.floor(py / cell_height), math.floor(px / cell_width), EXPLORED, margin)
-    for k in range(math.ceil(length / step)):
+    along_x, along_y = step * math.cos(theta), step * math.sin(theta)
+    begin, end = _on_sheet(mount_x, mount_y, along_x, along_y, math.ceil(length / step), width, height)
+    for k in range(begin, end):
         px, py = mount_x + k * step * math.cos(theta), mount_y + k * step * math.sin(theta)
         row, column = math.floor(py / cell_height), math.floor(px / cell_width)
         if not (sees and row == end_row and column == end_column):
