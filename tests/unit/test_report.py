@@ -17,6 +17,7 @@ from pilotage.core.types import Event
 from pilotage.records.cells import SheetData
 from pilotage.records.run_data import read_run
 from pilotage.report import write_report
+from pilotage.report.figures.pose_error import pose_error_figure
 from pilotage.report.figures.timeline import timeline_figure
 from pilotage.report.sheet.path import coverage_figure, path_figure
 from pilotage.report.style import drawing_style
@@ -217,6 +218,15 @@ def test_events_at_one_place_of_a_sheet_share_a_badge(tmp_path: Path) -> None:
         assert "2–2000" in svg
         assert len(svg) < 60_000
         assert len(coverage_figure(run).svg) < 60_000
+
+
+def test_a_robot_that_is_lost_as_soon_as_it_starts_has_an_error_without_a_peak(tmp_path: Path) -> None:
+    columns = fabricate_columns(60, np.random.default_rng(5))
+    for name in ("est_x_m", "est_y_m", "est_theta_rad", "cov_xx_m2", "cov_yy_m2", "cov_tt_rad2"):
+        columns[name] = np.where(np.arange(60) < 1, columns[name], np.nan)
+    run = read_run(fabricate_run(tmp_path / "run", steps=60, columns=columns))
+    with drawing_style():
+        assert "<svg" in pose_error_figure(run).svg
 
 
 def test_long_run_stays_small_and_keeps_its_peak(tmp_path: Path) -> None:

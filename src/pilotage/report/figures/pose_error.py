@@ -61,7 +61,7 @@ def pose_error_figure(run: RunData) -> Illustration:
         if not bool(np.isfinite(error).any()):
             note(axes, "not recorded")
             continue
-        limit = nice_limit(float(np.nanmax([peak(error[settled]), _usual_peak(sigma2[settled])])) * scale)
+        limit = nice_limit(float(np.fmax(peak(error[settled]), _usual_peak(sigma2[settled]))) * scale)
         axes.set_ylim(-limit, limit)
         shade(axes, np.array([[min(float(t_s[0]), 0.0), run.settle_s]]), SHADE)
         times, half = band(t_s, sigma2 * scale)
