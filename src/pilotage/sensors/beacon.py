@@ -11,7 +11,7 @@ from pydantic import Field
 from pilotage.core.types import FloatArray
 from pilotage.sensors.numbers import Numbers, SensorSetting
 from pilotage.sensors.readings import BeaconReadings
-from pilotage.sensors.sensor import SENSORS, NonNegative, Positive, SensorConfig
+from pilotage.sensors.sensor import SENSORS, NonNegative, Reach, SensorConfig
 
 
 @SENSORS.add_config("beacons")
@@ -22,7 +22,7 @@ class BeaconConfig(SensorConfig):
     """
 
     field_of_view_rad: float = Field(default=math.radians(270.0), gt=0.0, le=2.0 * math.pi)
-    max_range_m: Positive = 20.0
+    max_range_m: Reach = 20.0
     range_var_m2: NonNegative = 3.4665e-4
     bearing_var_rad2: NonNegative = 1.1771e-4
     bearing_offset_rad: float = Field(default=0.0, ge=-math.pi, le=math.pi)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pydantic import Field
 
 from pilotage.sensors.numbers import Numbers, SensorSetting
-from pilotage.sensors.sensor import SENSORS, NonNegative, Positive, SensorConfig
+from pilotage.sensors.sensor import SENSORS, NonNegative, Positive, Reach, SensorConfig
 
 
 @SENSORS.add_config("infrared")
@@ -18,7 +18,7 @@ class InfraredConfig(SensorConfig):
     rate_hz: float = Field(default=20.0, gt=0.0)
     range_std_fraction: NonNegative = 0.035
     min_range_m: NonNegative = 0.0
-    max_range_m: Positive = 0.8
+    max_range_m: Reach = 0.8
     reliable_range_m: Positive = 0.3
 
     def as_numbers(self, setting: SensorSetting) -> tuple[Numbers, ...]:

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from pilotage.core.types import FloatArray
 from pilotage.sensors.numbers import Numbers, SensorSetting
-from pilotage.sensors.sensor import SENSORS, NonNegative, Positive, SensorConfig
+from pilotage.sensors.sensor import SENSORS, NonNegative, Reach, SensorConfig
 
 SURE_SHARE = 0.995
 """Of a scanner's reach."""
@@ -21,7 +21,7 @@ class LidarConfig(SensorConfig):
 
     beams: int = Field(default=539, ge=1, le=100_000)
     field_of_view_rad: float = Field(default=math.radians(270.0), gt=0.0, le=2.0 * math.pi)
-    max_range_m: Positive = 20.0
+    max_range_m: Reach = 20.0
     range_var_m2: NonNegative = 9.62015e-6
 
     @property

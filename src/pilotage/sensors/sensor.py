@@ -12,10 +12,12 @@ from pilotage.core.config import Config
 from pilotage.core.errors import InputError
 from pilotage.core.registry import Registry
 from pilotage.core.types import FloatArray, Pose2
-from pilotage.sensors.numbers import Numbers, SensorSetting
+from pilotage.sensors.numbers import FARTHEST_M, Numbers, SensorSetting
 
 NonNegative = Annotated[float, Field(ge=0.0)]
 Positive = Annotated[float, Field(gt=0.0)]
+Reach = Annotated[float, Field(gt=0.0, le=FARTHEST_M)]
+"""How far a sensor sees."""
 
 
 class Mount(Config):

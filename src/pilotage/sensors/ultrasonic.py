@@ -7,7 +7,7 @@ import math
 from pydantic import Field
 
 from pilotage.sensors.numbers import Numbers, SensorSetting
-from pilotage.sensors.sensor import SENSORS, NonNegative, Positive, SensorConfig
+from pilotage.sensors.sensor import SENSORS, NonNegative, Reach, SensorConfig
 
 
 @SENSORS.add_config("ultrasonic")
@@ -16,7 +16,7 @@ class UltrasonicConfig(SensorConfig):
 
     cone_rad: float = Field(default=math.radians(10.0), gt=0.0, lt=math.pi)
     min_range_m: NonNegative = 0.05
-    max_range_m: Positive = 3.0
+    max_range_m: Reach = 3.0
     range_var_m2: NonNegative = 0.0
 
     def as_numbers(self, setting: SensorSetting) -> tuple[Numbers, ...]:
