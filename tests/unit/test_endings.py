@@ -46,10 +46,10 @@ def test_a_success_is_complete_and_damaged_rows_say_nothing() -> None:
     [
         ([1.0] * 21, 0.0, True, ""),
         ([0.0] * 21, 0.0, True, "; it never knew where it was"),
-        ([1.0] * 11 + [0.0] * 10, 0.0, True, "; it was lost for 1 s of that, and at the end"),
-        ([0.0] * 11 + [1.0] * 10, 0.0, True, "; it was lost for 1 s of that"),
+        ([1.0] * 11 + [0.0] * 10, 0.0, True, "; it was lost for 10 s of that, and at the end"),
+        ([0.0] * 11 + [1.0] * 10, 0.0, True, "; it was lost for 10 s of that"),
         ([1.0] * 21, 3.0, True, "; it was 3.00 m from where it believed, sure of that to "),
-        ([1.0] * 21, 0.0, False, "; it stood for the last 2 s"),
+        ([1.0] * 21, 0.0, False, "; it stood for the last 21 s"),
     ],
 )
 def test_who_ran_out_of_time_says_what_it_knows(
@@ -61,7 +61,13 @@ def test_who_ran_out_of_time_says_what_it_knows(
     robot = finished.robots[0]
     trace: dict[str, Any] = {**robot.trace, "localized": np.array(localized)[: len(robot.trace["t_s"])]}
     away = np.linspace(0.0, 2.0 if moves else 0.0, len(trace["t_s"]))
-    trace |= {"true_x_m": away, "true_y_m": 0.0 * away, "est_x_m": away + off_m, "est_y_m": 0.0 * away}
+    trace |= {
+        "t_s": 10.0 * trace["t_s"],
+        "true_x_m": away,
+        "true_y_m": 0.0 * away,
+        "est_x_m": away + off_m,
+        "est_y_m": 0.0 * away,
+    }
     late = replace(robot, trace=trace, status=StackStatus.RUNNING)
     run = replace(finished, robots=(late,), ending="time limit of 2 s reached")
     metrics = told_why(experiment.task.judge(run), run).metrics

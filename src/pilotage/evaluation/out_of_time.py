@@ -13,8 +13,8 @@ from pilotage.evaluation.finished import FinishedRun, RobotRun, Verdict
 from pilotage.evaluation.pose_errors import pose_errors
 from pilotage.stack.interface import StackStatus
 
-LEAST_SHARE = 0.1
-"""Of the time: who was lost for less of it, or stood at the end for less, was not late by that."""
+LEAST_SHARE, LEAST_S = 0.1, 5.0
+"""Of the time, and at least: who was lost for less, or stood at the end for less, was not late by that."""
 STOOD_M = 0.1
 FAR_OFF_M = 0.5
 """A belief at the end that is farther off, or less certain, is told."""
@@ -50,11 +50,12 @@ def why_late(robot: RobotRun) -> str:
     if t_s.shape[0] < 2:
         return ""
     whole_s, claimed = float(t_s[-1]), claimed_at(trace)
+    least_s = max(LEAST_SHARE * whole_s, LEAST_S)
     lost_s = float(np.diff(t_s)[~claimed[1:]].sum())
     words = []
     if not claimed.any():
         words.append("never knew where it was")
-    elif lost_s > LEAST_SHARE * whole_s:
+    elif lost_s > least_s:
         end = "" if claimed[-1] else ", and at the end"
         words.append(f"was lost for {lost_s:.0f} s of that{end}")
     if claimed[-1]:
@@ -65,6 +66,6 @@ def why_late(robot: RobotRun) -> str:
     away_m = np.hypot(trace["true_x_m"] - trace["true_x_m"][-1], trace["true_y_m"] - trace["true_y_m"][-1])
     moving = np.flatnonzero(away_m > STOOD_M)
     stood_s = whole_s - float(t_s[moving[-1]]) if moving.size else whole_s
-    if stood_s > LEAST_SHARE * whole_s:
+    if stood_s > least_s:
         words.append(f"stood for the last {stood_s:.0f} s")
     return ", ".join(words)
