@@ -16,6 +16,7 @@ from PIL import Image
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import Pose2
+from pilotage.kernels.grids.marks import marked_at
 from pilotage.maps import memory
 from pilotage.maps.grid_file import read_grid
 from pilotage.maps.grid_image import read_grey, read_hazard_image, write_grey
@@ -419,3 +420,19 @@ class TestOtherFiles:
             memory.require_memory(2 * 10**9, "a map")
         monkeypatch.setattr(memory, "available_bytes", lambda: None)
         memory.require_memory(10**18, "a map")
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    marks=arrays(np.bool_, array_shapes(min_dims=2, max_dims=2, max_side=6)),
+    theta_rad=st.sampled_from([0.0, 0.4, -2.0, math.pi]),
+    seed=st.integers(0, 1000),
+)
+def test_marked_cells_are_those_that_places_lie_in(marks: Any, theta_rad: float, seed: int) -> None:
+    grid = OccupancyGrid.of(marks, 0.3, Pose2(-0.7, 0.2, theta_rad))
+    rng = np.random.default_rng(seed)
+    points = np.vstack([rng.uniform(-3.0, 3.0, (40, 2)), [(math.nan, 0.0), (math.inf, 0.0), (0.0, -1e300)]])
+    with np.errstate(invalid="ignore"):
+        cells = grid.cells_at(points)
+    expected = [grid.contains(row, column) and bool(marks[row, column]) for row, column in cells]
+    assert marked_at(points, np.ascontiguousarray(marks), grid.frame).tolist() == expected

@@ -103,6 +103,14 @@ class OccupancyGrid:
         """Width and height in the grid's own frame."""
         return self.columns * self.resolution_m, self.rows * self.resolution_m
 
+    @property
+    def frame(self) -> FloatArray:
+        """(5,) as kernels have it: x, y, cosine and sine of the lower left corner's pose, a cell's side."""
+        theta = self.origin.theta_rad
+        return np.array(
+            [self.origin.x_m, self.origin.y_m, math.cos(theta), math.sin(theta), self.resolution_m]
+        )
+
     def blocked(self, occupied_from: int = OCCUPIED_FROM, unknown_is_free: bool = False) -> BoolArray:
         """(rows, columns) whether a cell is an obstacle."""
         if unknown_is_free:
@@ -134,8 +142,9 @@ class OccupancyGrid:
         """
         # Far beyond the grid is outside as well, without leaving the range of whole numbers.
         with np.errstate(over="ignore", invalid="ignore"):
-            places = np.nan_to_num(self.places_at(points_xy_m), nan=-1.0)
-        return np.floor(np.clip(places, -1.0, 2.0**40)).astype(np.int64)
+            places = self.places_at(points_xy_m)
+        # The greater number is the other one where a place is NaN.
+        return np.floor(np.minimum(np.fmax(places, -1.0), 2.0**40)).astype(np.int64)
 
     def cell_at(self, x_m: float, y_m: float) -> tuple[int, int]:
         """Row and column of the cell that a point lies in; outside the grid as they come."""

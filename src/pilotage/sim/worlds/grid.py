@@ -60,7 +60,5 @@ class GridLayer:
         tile = CELLS_A_TILE * grid.resolution_m
         rows, columns = (math.ceil(n / CELLS_A_TILE) for n in occupied.shape)
         starts, items = tiles.count_in_tiles(sides, tile, columns, rows)
-        origin = grid.origin
-        c, s = math.cos(origin.theta_rad), math.sin(origin.theta_rad)
-        frame = np.array([origin.x_m, origin.y_m, c, s, grid.resolution_m, tile, columns, rows])
+        frame = np.append(grid.frame, [tile, columns, rows])
         return GridLayer((jumps.leaps(occupied), sides, starts, items, frame))

@@ -10,9 +10,9 @@ import scipy
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray
 from pilotage.kernels.filters import particles
+from pilotage.kernels.grids.marks import marked_at
 from pilotage.maps.known_maps import OncePerMap
 from pilotage.maps.nearest_obstacles import NearestObstacles
-from pilotage.maps.occupancy_grid import FREE, UNKNOWN, OccupancyGrid
 from pilotage.maps.outlines import rim_lines
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.maps.world_map import WorldMap
@@ -150,10 +150,7 @@ class LikelihoodField:
             xmin, ymin, xmax, ymax = self._bounds_m
             x, y = points[:, 0], points[:, 1]
             return np.asarray((x >= xmin) & (x <= xmax) & (y >= ymin) & (y <= ymax))
-        cells = self._known.cells_at(points)
-        inside = ((cells >= 0) & (cells < self._known.cells.shape)).all(axis=1)
-        cells[~inside] = 0
-        return np.asarray(inside & (self._known.cells[cells[:, 0], cells[:, 1]] >= 0))
+        return marked_at(np.ascontiguousarray(points), *self._known)
 
     def distances_m(self, points: FloatArray) -> FloatArray:
         """(K,) from points (K, 2) of the map frame to the nearest wall or occupied cell."""
@@ -177,11 +174,9 @@ def _spacing_m(chart: WorldMap) -> float:
     return min(SPACING_M, max(chart.grid.resolution_m, least_m))
 
 
-def _known_of(chart: WorldMap) -> OccupancyGrid | None:
-    """The grid with what lies right beside its known cells taken for known; None where all is."""
+def _known_of(chart: WorldMap) -> tuple[BoolArray, FloatArray] | None:
+    """Which cells of the grid are known or lie right beside such, and its frame; None where all are."""
     if chart.geometry is not None or chart.grid is None or not (chart.grid.cells < 0).any():
         return None
-    near = scipy.ndimage.binary_dilation(chart.grid.cells >= 0, iterations=BESIDE_CELLS)
-    return OccupancyGrid(
-        np.where(near, FREE, UNKNOWN).astype(np.int8), chart.grid.resolution_m, chart.grid.origin
-    )
+    known = scipy.ndimage.binary_dilation(chart.grid.cells >= 0, iterations=BESIDE_CELLS)
+    return known, chart.grid.frame

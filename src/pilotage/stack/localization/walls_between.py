@@ -61,6 +61,4 @@ def _cells_of(chart: WorldMap) -> tuple[Cells, FloatArray] | None:
     occupied = np.ascontiguousarray(chart.grid.blocked(unknown_is_free=True)[::-1])
     if not occupied.any():
         return None
-    origin = chart.grid.origin
-    c, s = math.cos(origin.theta_rad), math.sin(origin.theta_rad)
-    return leaps(occupied), np.array([origin.x_m, origin.y_m, c, s, chart.grid.resolution_m])
+    return leaps(occupied), chart.grid.frame
