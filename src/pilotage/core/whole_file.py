@@ -41,13 +41,15 @@ def made_folder(folder: Path) -> Iterator[None]:
 def draft_of(path: Path) -> Iterator[Path]:
     """A draft that takes the place of ``path`` when it is whole: two processes may write at once.
 
+    Its name ends as that of ``path``, by which libraries know what to write.
+
     Raises
     ------
     InputError
         Where something stands there that is no file, such as ``/dev/null``.
     """
     _require_place(path)
-    draft = path.with_name(f"{draft_prefix(path)}draft")
+    draft = path.with_name(f"{draft_prefix(path)}draft{path.suffix}")
     try:
         with named(path, draft):
             yield draft
