@@ -31,7 +31,7 @@ _WAITING = 8
 @contextmanager
 def annotated_film(folder: Path, scene: Scene) -> Iterator[AnnotatedFilm]:
     """The film that appears in a folder under its name when it is complete; else nothing is left of it."""
-    with draft_of(folder / FILM_NAME) as draft:
+    with draft_of(folder / FILM_NAME, end=".webm") as draft:
         film = AnnotatedFilm(draft, scene)
         try:
             yield film
