@@ -14,7 +14,7 @@ import time
 from pathlib import Path
 
 from pilotage.tracking.opencv import opencv
-from pilotage.tracking.output import AnnotatedFilm
+from pilotage.tracking.output import annotated_film
 from pilotage.tracking.scene import TrackOptions, learn_scene
 from pilotage.tracking.track import follow
 
@@ -32,10 +32,8 @@ def main(arguments: list[str]) -> int:
     alone = track.frames / (time.process_time() - start_s)
     start_s = time.process_time()
     scene = learn_scene(film, TrackOptions())
-    with tempfile.TemporaryDirectory() as folder:
-        writer = AnnotatedFilm(Path(folder), scene)
+    with tempfile.TemporaryDirectory() as folder, annotated_film(Path(folder), scene) as writer:
         follow(film, scene, writer)
-        writer.close()
     both = track.frames / (time.process_time() - start_s)
     print(f"{track.frames} frames, robot found in {len(track.path.frames)}")
     print(f"tracking {alone:.0f} frames a second; with the annotated film {both:.0f}")

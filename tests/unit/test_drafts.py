@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 from pilotage.core.drafts import draft_prefix
-from pilotage.core.whole_file import write_whole
+from pilotage.core.whole_file import draft_of, write_whole
 from pilotage.records.run_folder import draft_folder
 
 
@@ -40,3 +40,11 @@ def test_drafts_of_dead_writers_go_with_the_next_write(tmp_path: Path) -> None:
     assert {path.name for path in tmp_path.iterdir()} == {"a.csv", "run", *(path.name for path in living)}
     assert table.read_text() == "whole"
     assert [path.name for path in run.iterdir()] == ["metrics.json"]
+
+
+def test_a_draft_is_not_found_by_the_end_of_its_name(tmp_path: Path) -> None:
+    """Folders of logs are looked through for ``*.csv``, hidden ones too."""
+    with draft_of(tmp_path / "a.csv") as draft:
+        draft.write_text("half")
+        assert list(tmp_path.glob("*.csv")) == []
+    assert [path.name for path in tmp_path.iterdir()] == ["a.csv"]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import importlib
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -70,6 +71,59 @@ def test_of_processes_that_begin_together_one_compiles(tmp_path: Path) -> None:
         check=True,
     )
     assert again.stdout.split() == ["1", "0"]  # another source is compiled anew
+
+
+@pytest.mark.usefixtures("nothing_compiled")
+@pytest.mark.parametrize("when", ["before", "while it is compiled"])
+def test_a_kernel_whose_cache_is_gone_is_compiled(
+    when: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Who emptied the cache beside a first run ended it with "No such file"; so did a disk that was full."""
+
+    @kernel
+    def lost(x: float) -> float:
+        return x + 3.0
+
+    def lose() -> None:
+        shutil.rmtree(tmp_path, ignore_errors=True)
+        tmp_path.write_text("no folder")
+
+    if when == "before":
+        lose()
+    else:
+        making: Any = dispatchers._Locator.ensure_cache_path
+        times = iter([lambda: None, lose])
+
+        def made(self: Any) -> None:
+            making(self)
+            next(times)()
+
+        monkeypatch.setattr(dispatchers._Locator, "ensure_cache_path", made)
+    assert lost(1.0) == 4.0
+    tmp_path.unlink()
+
+
+@pytest.mark.usefixtures("nothing_compiled")
+@pytest.mark.parametrize("end", ["nbi", "nbc"])
+def test_a_damaged_cache_is_compiled_anew(end: str, tmp_path: Path) -> None:
+    """A power cut leaves files of no bytes: each later run ended in a traceback."""
+
+    def make() -> Any:
+        @kernel
+        def cut(x: float) -> float:
+            return x + 4.0
+
+        return cut
+
+    assert make()(1.0) == 5.0
+    (kept,) = tmp_path.rglob(f"*.{end}")
+    kept.write_bytes(b"")
+    again = make()
+    assert again(1.0) == 5.0
+    assert sum(again.stats.cache_hits.values()) == 0
+    healed = make()
+    assert healed(1.0) == 5.0
+    assert sum(healed.stats.cache_hits.values()) == 1
 
 
 @pytest.mark.parametrize(("home", "xdg"), [("", ""), ("here", "there")])

@@ -21,6 +21,7 @@ from pilotage.experiments.run import run_mission
 from pilotage.maps.crater_cache import cached_crater_terrain
 from pilotage.maps.crater_terrain import CraterTerrainConfig, crater_terrain
 from pilotage.report import write_report
+from unit.test_drafts import gone, left
 
 
 @pytest.fixture
@@ -152,7 +153,12 @@ class TestGround:
             assert (kept.landmarks.points_xy_m == made.landmarks.points_xy_m).all()
         (folder,) = (tmp_path / "terrain").iterdir()
         (folder / "elevation.npy").write_bytes(b"broken")
+        left(folder, gone()).mkdir()
         assert (cached_crater_terrain(config).hazards.cells == made.hazards.cells).all()
+        assert list((tmp_path / "terrain").iterdir()) == [folder], (
+            "drafts of killed processes stayed for ever"
+        )
+        assert (np.load(folder / "elevation.npy") == made.elevation.elevation_m).all()
 
 
 class TestOptions:

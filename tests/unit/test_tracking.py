@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 import tempfile
+import threading
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -17,6 +18,7 @@ from pilotage.core.errors import InputError
 from pilotage.maps.cell_map import CellState
 from pilotage.tracking.channels import greatest_channel, least_channel
 from pilotage.tracking.opencv import opencv
+from pilotage.tracking.output import annotated_film
 from pilotage.tracking.path import build_path
 from pilotage.tracking.robot_colour import parse_hsv
 from pilotage.tracking.robot_finder import Sighting
@@ -173,6 +175,27 @@ def test_the_command_writes_json_csv_pictures_and_a_film(
     assert main(["map-score", *printed, "--visited", str(out / "track.json"), "--json"]) == 0
     score = json.loads(capfd.readouterr().out)
     assert score["feature_precision"] == score["visited_accuracy"] == 1.0
+
+
+def test_what_strikes_while_the_film_is_finished_ends_what_encodes(
+    filmed: Filmed, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A signal there left half a film, and the encoder's threads aborted the process at its end."""
+    join, struck = threading.Thread.join, list[threading.Thread]()
+
+    def strike(thread: threading.Thread, timeout: float | None = None) -> None:
+        if not struck:
+            struck.append(thread)
+            raise KeyboardInterrupt
+        join(thread, timeout)
+
+    scene, out = learn_scene(filmed(FilmScript(frames=30)), TrackOptions()), tmp_path / "out"
+    out.mkdir()
+    monkeypatch.setattr(threading.Thread, "join", strike)
+    with pytest.raises(KeyboardInterrupt), annotated_film(out, scene) as film:
+        film(scene.film.samples[0], None)
+    assert not struck[0].is_alive()
+    assert list(out.iterdir()) == []
 
 
 def test_a_film_that_breaks_off_gives_what_there_was(

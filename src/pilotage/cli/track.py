@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Annotated
 
@@ -46,7 +46,7 @@ def track(
     json: Json = False,
 ) -> int:
     """Track a robot on a square map through a film."""
-    from pilotage.tracking.output import AnnotatedFilm, write_track
+    from pilotage.tracking.output import annotated_film, write_track
     from pilotage.tracking.robot_colour import parse_hsv
     from pilotage.tracking.scene import TrackOptions, learn_scene
     from pilotage.tracking.sheet import parse_corners
@@ -65,18 +65,15 @@ def track(
         scene = learn_scene(film, options, advance)
     folder = None if out is None else Path(out)
     written: list[Path] = []
-    with nullcontext() if folder is None else made_folder(folder):
-        writer = None if folder is None else AnnotatedFilm(folder, scene)
-        done = False
-        try:
-            with _progress("tracking") as advance:
-                result = follow(film, scene, writer, advance)
-            if folder is not None:
-                written = write_track(folder, result)
-            done = True
-        finally:
-            if writer is not None:
-                writer.close(keep=done)
+    with ExitStack() as made:
+        writer = None
+        if folder is not None:
+            made.enter_context(made_folder(folder))
+            writer = made.enter_context(annotated_film(folder, scene))
+        with _progress("tracking") as advance:
+            result = follow(film, scene, writer, advance)
+        if folder is not None:
+            written = write_track(folder, result)
     values = result.as_dict()
     broke = scene.film.broke_at_frame
     if broke is not None:

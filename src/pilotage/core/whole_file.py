@@ -38,8 +38,10 @@ def made_folder(folder: Path) -> Iterator[None]:
 
 
 @contextmanager
-def draft_of(path: Path) -> Iterator[Path]:
+def draft_of(path: Path, end: str = "") -> Iterator[Path]:
     """A draft that takes the place of ``path`` when it is whole: two processes may write at once.
+
+    Its name ends with ``end``, where a library knows by that what to write; else as nothing looked for.
 
     Raises
     ------
@@ -47,7 +49,7 @@ def draft_of(path: Path) -> Iterator[Path]:
         Where something stands there that is no file, such as ``/dev/null``.
     """
     _require_place(path)
-    draft = path.with_name(f"{draft_prefix(path)}draft")
+    draft = path.with_name(f"{draft_prefix(path)}draft{end}")
     try:
         with named(path, draft):
             yield draft

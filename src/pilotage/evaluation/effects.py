@@ -4,7 +4,8 @@ A design is an array of trials by levels: every trial once at every combination 
 (scipy): with shared seeds Wilcoxon's signed ranks for two levels and Friedman's for more, with seeds apart
 Mann and Whitney's and Kruskal and Wallis'. The other factors are averaged out. An interaction is tested on
 contrasts: where the effect of one factor is the same at every level of the other, its contrasts there are
-exchangeable, so that the same tests hold.
+exchangeable, so that the same tests hold. What multiplies a metric moves its spread too: the contrasts are
+those along the factor that spreads it, compared between the levels of the other.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from pilotage.core.types import FloatArray
+from pilotage.core.types import BoolArray, FloatArray
 from pilotage.evaluation.drawn_studies import DrawnStudies
 from pilotage.evaluation.paired import Difference, difference, difference_apart, least_trials
 from pilotage.evaluation.rank_power import RankTest, seen_in
@@ -135,10 +136,7 @@ def effects_of_each(
     rounded = [np.round(values / scale, 12) for values, scale in zip(metrics, scales, strict=True)]
     axes = range(metrics[0].ndim - 1)
     asked = [[_main(values, axis, ordered[axis], paired, tests) for values in rounded] for axis in axes]
-    asked += [
-        [_interaction(values, pair, paired, tests) for values in rounded]
-        for pair in itertools.combinations(axes, 2)
-    ]
+    asked += [_interactions(rounded, pair, paired, tests) for pair in itertools.combinations(axes, 2)]
     judged = zip(*map(_judged, asked), strict=True)
     return [
         [_scaled(effect, scale) for effect in effects] for effects, scale in zip(judged, scales, strict=True)
@@ -189,12 +187,36 @@ def _main(values: FloatArray, axis: int, ordered: bool, paired: bool, tests: int
     return _asked((axis,), by_level[:, None, :], means, ends, size, values, paired, tests)
 
 
-def _interaction(values: FloatArray, pair: tuple[int, int], paired: bool, tests: int) -> Effect:
-    others = tuple(other + 1 for other in range(values.ndim - 1) if other not in pair)
-    both = values.mean(axis=others) if others else values
-    first, second = pair
-    if both.shape[1] > both.shape[2]:
-        both, first, second = both.transpose(0, 2, 1), second, first
+def _interactions(
+    metrics: Sequence[FloatArray], pair: tuple[int, int], paired: bool, tests: int
+) -> list[Effect]:
+    others = tuple(other + 1 for other in range(metrics[0].ndim - 1) if other not in pair)
+    each = np.stack([values.mean(axis=others) if others else values for values in metrics])
+    if each.shape[2] > each.shape[3]:
+        each, pair = each.swapaxes(2, 3), pair[::-1]
+    out = []
+    for values, both, turned in zip(metrics, each, _second_spreads(each, paired), strict=True):
+        held, axes = (both.swapaxes(1, 2), pair[::-1]) if turned else (both, pair)
+        out.append(_interaction(values, held, axes, paired, tests))
+    return out
+
+
+def _second_spreads(each: FloatArray, paired: bool) -> BoolArray:
+    """(metrics,) whether it is the second factor of (metrics, n, l1, l2) values that spreads them: whether
+    distances from the settings' own medians differ from level to level, and more surely than by the first.
+    """
+    apart = each - each.mean(axis=(2, 3), keepdims=True) if paired else each
+    apart = np.abs(apart - np.median(apart, axis=1, keepdims=True))
+    first, second = (
+        np.nan_to_num(rank_tests(levels.reshape(len(each), -1, levels.shape[-1]), paired=False), nan=1.0)
+        for levels in (apart.swapaxes(2, 3), apart)
+    )
+    return (second < SURE) & (second < first)
+
+
+def _interaction(
+    values: FloatArray, both: FloatArray, axes: tuple[int, int], paired: bool, tests: int
+) -> Effect:
     count = both.shape[1]
     if count == 2:
         contrasts = (both[:, 1] - both[:, 0])[:, None, :]
@@ -204,7 +226,7 @@ def _interaction(values: FloatArray, pair: tuple[int, int], paired: bool, tests:
     terms = means - means.mean(axis=0) - means.mean(axis=1)[:, None] + means.mean()
     size = float((terms**2).sum()) * values.shape[0] * (values[0].size / means.size)
     ends = (0, means.shape[1] - 1)
-    found = _asked((first, second), np.round(contrasts, 12), means, ends, size, values, paired, tests)
+    found = _asked(axes, np.round(contrasts, 12), means, ends, size, values, paired, tests)
     along = both[:, -1] - both[:, 0]
     return replace(found, columns=(along[:, 0], along[:, -1]))
 
@@ -239,28 +261,28 @@ def _asked(
 
 def _judged(asked: Sequence[Effect]) -> list[Effect]:
     """The same effect on several metrics, with its p-values."""
-    count, levels = asked[0].contrasts.shape[1:]
-    each = np.empty((len(asked), count))
-    tests = np.stack([np.moveaxis(effect.contrasts, 1, 0) for effect in asked])
     # Of two levels scipy takes the exact law only where no row that it is handed has sizes alike.
-    alike = np.array([levels == 2 and _sizes_alike(effect) for effect in asked])
-    for rows in (alike, ~alike):
-        if rows.any():
-            stacked = tests[rows].reshape(-1, *tests.shape[2:])
-            each[rows] = rank_tests(stacked, paired=asked[0].paired).reshape(-1, count)
-    out = []
-    for effect, p_values in zip(asked, each, strict=True):
-        found = p_values[np.isfinite(p_values)]
-        p_value = min(1.0, count * float(found.min())) if found.size else math.nan
-        out.append(replace(effect, p_value=p_value))
-    return out
+    kinds = [(effect.contrasts.shape, _sizes_alike(effect)) for effect in asked]
+    p_values = [math.nan] * len(asked)
+    for kind in dict.fromkeys(kinds):
+        places = [place for place, found in enumerate(kinds) if found == kind]
+        tests = np.concatenate([np.moveaxis(asked[place].contrasts, 1, 0) for place in places])
+        count = kind[0][1]
+        found = count * rank_tests(tests, paired=asked[0].paired).reshape(-1, count)
+        for place, least in zip(places, np.fmin.reduce(found, axis=1), strict=True):
+            p_values[place] = float(np.minimum(least, 1.0))
+    return [replace(effect, p_value=p_value) for effect, p_value in zip(asked, p_values, strict=True)]
 
 
 def _sizes_alike(effect: Effect) -> bool:
-    """Whether ranks are shared, or pairs do not differ."""
-    first, other = effect.contrasts[:, 0, 0], effect.contrasts[:, 0, 1]
-    sizes = np.append(np.abs(other - first), 0.0) if effect.paired else np.concatenate([first, other])
-    return np.unique(sizes).size < sizes.size
+    """Whether two levels share ranks, or pairs do not differ."""
+    if effect.contrasts.shape[2] > 2:
+        return False
+    sizes = effect.contrasts.swapaxes(0, 1).reshape(effect.contrasts.shape[1], -1)
+    if effect.paired:
+        change = np.abs(effect.contrasts[:, :, 1] - effect.contrasts[:, :, 0]).T
+        sizes = np.append(change, np.zeros((len(change), 1)), axis=1)
+    return any(np.unique(row).size < row.size for row in sizes)
 
 
 def _scaled(effect: Effect, scale: float) -> Effect:

@@ -8,9 +8,11 @@ Clones and installations of one source share it; of processes that need a functi
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from functools import cached_property
 from pathlib import Path
+from pickle import UnpicklingError
 from typing import IO, Any
 
 import numba
@@ -46,6 +48,11 @@ class _Locator(_SourceFileBackedLocatorMixin, _CacheLocator):
     def get_cache_path(self) -> str:
         return str(folder_of(Path(self._py_file)))
 
+    def ensure_cache_path(self) -> None:
+        """Where there can be none (any more), nothing is found and nothing kept."""
+        with suppress(OSError):
+            super().ensure_cache_path()  # type: ignore[no-untyped-call]
+
 
 class _Compiled(CompileResultCacheImpl):
     def __init__(self, py_func: Callable[..., Any]) -> None:
@@ -78,6 +85,15 @@ class _Cache(FunctionCache):
             super().save_overload(sig, data)  # type: ignore[no-untyped-call]
         finally:
             self._release()
+
+    @contextmanager
+    def _guard_against_spurious_io_errors(self) -> Iterator[None]:
+        """What cannot be read or kept is compiled: the folder was removed, the disk is full, a file cut."""
+        with suppress(OSError):
+            try:
+                yield
+            except (EOFError, UnpicklingError):
+                self._cache_file.flush()  # type: ignore[no-untyped-call]
 
     def _wait(self) -> IO[bytes] | None:
         """The lock of this function, held; None where nobody gives it free in time or it cannot be taken."""

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import scipy
 
+from pilotage.core.drafts import clear_drafts, draft_prefix
 from pilotage.core.errors import InputError
 from pilotage.core.files import read_bytes
 from pilotage.core.files.arrays import map_npy
@@ -43,7 +44,7 @@ def cached_crater_terrain(config: CraterTerrainConfig) -> CraterTerrain:
     try:
         return _read(place, config)
     except (OSError, ValueError, InputError):
-        pass
+        shutil.rmtree(place, ignore_errors=True)  # what is damaged would be in the way for ever
     terrain = crater_terrain(config)
     try:
         _write(place, terrain)
@@ -62,7 +63,7 @@ def _digest(config: CraterTerrainConfig) -> str:
 
 def _write(place: Path, terrain: CraterTerrain) -> None:
     """Beside it first: two runs at once do not read halves."""
-    draft = Path(tempfile.mkdtemp(prefix=".", dir=place.parent))
+    draft = Path(tempfile.mkdtemp(prefix=draft_prefix(place), dir=place.parent))
     try:
         np.save(draft / "elevation.npy", terrain.elevation.elevation_m)
         np.save(draft / "hazards.npy", terrain.hazards.cells)
@@ -74,6 +75,7 @@ def _write(place: Path, terrain: CraterTerrain) -> None:
             raise
     finally:
         shutil.rmtree(draft, ignore_errors=True)
+    clear_drafts(place)
 
 
 def _read(place: Path, config: CraterTerrainConfig) -> CraterTerrain:

@@ -7,7 +7,8 @@ import io
 import json
 import queue
 import threading
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,19 @@ _COLUMNS = ("frame", "t_s", "x_px", "y_px", "x_m", "y_m", "std_m")
 _WAITING = 8
 
 
+@contextmanager
+def annotated_film(folder: Path, scene: Scene) -> Iterator[AnnotatedFilm]:
+    """The film that appears in a folder under its name when it is complete; else nothing is left of it."""
+    with draft_of(folder / FILM_NAME, end=".webm") as draft:
+        film = AnnotatedFilm(draft, scene)
+        try:
+            yield film
+            film.finish()
+        finally:
+            # Whatever struck while it was finished: the process must not end before what encodes in it.
+            film.end()
+
+
 class AnnotatedFilm:
     """Writes the annotated film while the robot is followed.
 
@@ -36,25 +50,22 @@ class AnnotatedFilm:
 
     Parameters
     ----------
-    folder
-        Exists; the film appears in it under its name when it is complete.
+    path
+        Where it is written.
     scene
         What was learned of the film.
     """
 
-    def __init__(self, folder: Path, scene: Scene) -> None:
+    def __init__(self, path: Path, scene: Scene) -> None:
         cv2 = opencv()
-        self._final = folder / FILM_NAME
-        self._partial = folder / f"partial-{FILM_NAME}"
         height, width = scene.film.samples[0].shape[:2]
         # VP8 halves the colours' resolution: odd sizes are cut by a pixel.
         self._size = (width - width % 2, height - height % 2)
         self._annotator = Annotator(scene)
         code = cv2.VideoWriter_fourcc(*"VP80")
         with hushed():
-            self._writer = cv2.VideoWriter(str(self._partial), code, scene.film.fps, self._size)
+            self._writer = cv2.VideoWriter(str(path), code, scene.film.fps, self._size)
         if not self._writer.isOpened():
-            self._partial.unlink(missing_ok=True)
             raise InputError(
                 "this OpenCV cannot write VP8 video; leave out --out, or install its pip package"
             )
@@ -67,17 +78,17 @@ class AnnotatedFilm:
         """Take one frame."""
         self._queue.put((reduced_frame, sighting))
 
-    def close(self, *, keep: bool = True) -> None:
-        """Finish the film; without ``keep`` nothing is left of it."""
+    def finish(self) -> None:
+        """Wait until all is written; raise what failed on the way."""
+        self.end()
+        if self._failure is not None:
+            raise self._failure
+
+    def end(self) -> None:
+        """End what encodes; once more is no harm."""
         self._queue.put(None)
         self._thread.join()
         self._writer.release()
-        if keep and self._failure is None:
-            self._partial.replace(self._final)
-        else:
-            self._partial.unlink(missing_ok=True)
-        if keep and self._failure is not None:
-            raise self._failure
 
     def _write_all(self) -> None:
         width, height = self._size
