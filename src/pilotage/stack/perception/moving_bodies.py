@@ -26,8 +26,6 @@ VAGUE_M = 0.3
 """Standard deviation of a track's place: what is found in the gate of a vaguer one may be another thing."""
 LOOKED_RAD, LOOKED_M = 0.8, 1.0
 """Having turned or driven so far, it has seen what was behind it, or left it there."""
-UNLOOKED = 4.0
-"""So many times as long nobody backs who has not: people who stand behind it would be met."""
 NEAR_M = 2.0
 """What stands so near for a while is on the map of whoever maps."""
 
@@ -48,7 +46,7 @@ class MovingBodiesConfig(Config):
     about_s: NonNegative = 10.0
     """For so long it reckons with people after it saw one who walks, or walked a moment ago."""
     backs_after_s: NonNegative = 30.0
-    """For so long it does not drive where its laser does not look; longer if it has not looked since."""
+    """For so long it does not drive where its laser does not look, and not before it has looked around."""
     anyone_m_s: NonNegative = 1.0
     """So fast may come who is not tracked."""
     beside_m: NonNegative = 1.0
@@ -241,10 +239,8 @@ class MovingBodies:
 
     def may_be_at(self, bearing_rad: float) -> bool:
         """Whether somebody may be in a direction of the base's frame in which the laser does not look."""
-        if not self._works or self._sees(bearing_rad):
-            return False
-        backs_s = (1.0 if self._looked else UNLOOKED) * self._config.backs_after_s
-        return self._mates > 0 or self._t_s - self.seen_s < backs_s
+        stands = self._works and not self._sees(bearing_rad) and (self._mates > 0 or not self._looked)
+        return stands or self.may_have_come_to(bearing_rad)
 
     def may_have_come_to(self, bearing_rad: float) -> bool:
         """The same, of those alone who walked about not long ago."""
