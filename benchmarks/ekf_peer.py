@@ -21,6 +21,8 @@ import numpy as np
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.types import FloatArray
 from pilotage.kernels.filters import ekf
+from pilotage.kernels.filters.sighting import Known, Seen
+from pilotage.kernels.jit import kernel
 
 LANDMARKS = np.array([[8.0, 0.0], [0.0, 9.0], [-7.0, -2.0], [3.0, -8.0], [10.0, 10.0]])
 R = np.diag([3.4665e-4, 1.1771e-4])
@@ -49,27 +51,26 @@ def problem(seed: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     return increments, ranges, bearings
 
 
-def ours(increments: FloatArray, ranges: FloatArray, bearings: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Poses (T, 3) and covariances (T, 3, 3) by the kernel."""
-    steps = increments.shape[0]
-    poses, covs = np.empty((steps, 3)), np.empty((steps, 3, 3))
-    ekf.filter_log(
-        np.array([0.5, 0.0, 0.0]),
-        START_COV.copy(),
-        increments,
-        DENSITIES,
-        ranges,
-        bearings,
-        LANDMARKS,
-        np.zeros(3),
-        R,
-        math.inf,
-        True,
-        poses,
-        covs,
-        np.empty_like(ranges),
-    )
-    return poses, covs
+@kernel
+def log_filtered(
+    increments: FloatArray, ranges: FloatArray, bearings: FloatArray, known: Known, poses: FloatArray
+) -> None:
+    """The localizer's own kernels over a log; fills ``poses`` (T, 3)."""
+    pose, cov, Q, mount = np.array([0.5, 0.0, 0.0]), START_COV.copy(), np.zeros((2, 2)), np.zeros(3)
+    for t in range(increments.shape[0]):
+        distance, angle = increments[t, 0], increments[t, 1]
+        Q[0, 0] = DENSITIES[0] * abs(distance) + DENSITIES[1] * abs(angle)
+        Q[1, 1] = DENSITIES[2] * abs(angle) + DENSITIES[3] * abs(distance)
+        ekf.predict(pose, cov, distance, angle, Q, True)
+        ekf.update_range_bearings(pose, cov, Seen(known.ids, ranges[t], bearings[t]), known, mount, R, np.inf)
+        poses[t] = pose
+
+
+def ours(increments: FloatArray, ranges: FloatArray, bearings: FloatArray) -> FloatArray:
+    """Poses (T, 3) by the kernels."""
+    poses = np.empty((increments.shape[0], 3))
+    log_filtered(increments, ranges, bearings, Known(np.arange(len(LANDMARKS)), LANDMARKS), poses)
+    return poses
 
 
 def filterpys(peer: Any, increments: FloatArray, ranges: FloatArray, bearings: FloatArray) -> FloatArray:
@@ -132,7 +133,7 @@ def main() -> int:
     for _ in range(3):
         begin = time.perf_counter()
         for _ in range(LONG):
-            poses, _ = ours(increments, ranges, bearings)
+            poses = ours(increments, ranges, bearings)
         own = LONG * STEPS / (time.perf_counter() - begin)
         begin = time.perf_counter()
         peers = filterpys(ExtendedKalmanFilter, increments, ranges, bearings)

@@ -184,6 +184,24 @@ def test_the_guard_refuses_driving_into_the_map_but_not_away_from_it() -> None:
     assert guard.allows(Twist(0.5, 0.0), Pose2(0.2, 0.0, 0.0), wall, NO_CIRCLES, 1.0)
 
 
+def test_the_guard_swings_no_corner_into_the_map() -> None:
+    """A rectangle that turned to look around met somebody who stood beside it and was on its map."""
+    corners = np.array([[0.25, 0.2], [-0.25, 0.2], [-0.25, -0.2], [0.25, -0.2]])
+    robot = replace(told_of().robot, footprint=Footprint.polygon(corners))
+    guard = ArcGuard(GuardConfig(), robot)
+    far, here = NearWalls(np.array([[5.0, -5.0, 5.0, 5.0]])), Pose2(0.0, 0.0, 0.0)
+    beside, ahead = np.array([[0.0, 0.26, 0.03]]), np.array([[0.2, 0.26, 0.03]])
+    assert not guard.allows(Twist(0.0, 1.0), here, far, beside, 1.0)
+    assert not guard.allows(Twist(0.0, -1.0), here, far, beside, 1.0)
+    assert not guard.allows(Twist(0.0, 1.0), here, far, ahead, 1.0)
+    assert guard.allows(Twist(0.0, -1.0), here, far, ahead, 1.0)
+    assert guard.allows(Twist(0.0, 1.0), here, far, NO_CIRCLES, 1.0)
+    assert not guard.allows(Twist(0.0, 1.0), Pose2(4.74, 0.0, 0.0), far, NO_CIRCLES, 1.0)
+    back = Twist(-0.3, 0.0)
+    assert not guard.corners_may(back, here, far, np.array([[-0.3, 0.0, 0.03]]))
+    assert guard.corners_may(back, here, far, np.array([[0.3, 0.0, 0.03]]))
+
+
 def test_the_guard_knows_how_sharply_a_car_turns() -> None:
     """A car that was told to turn away from a pillar in half of its least radius drove into it."""
     robot = replace(told_of().robot, footprint=Footprint.disc(0.3), motion=BicycleConfig())

@@ -113,31 +113,3 @@ def test_the_reports_gate_was_the_wrong_tail() -> None:
     gate = chi_square_quantile(0.9, 2)
     # Standard error 0.0023: a false alarm once in 10^6.
     assert gated_mean(gate, 2) == pytest.approx(draws[draws < gate].mean(), abs=5 * 0.0023)
-
-
-def test_a_log_filtered_whole_is_the_same_as_step_by_step() -> None:
-    rng = np.random.default_rng(5)
-    landmarks = np.array([[4.0, 0.0], [0.0, 5.0], [-3.0, 2.0]])
-    steps = 60
-    increments = rng.normal(size=(steps, 2)) * 0.02 + np.array([0.05, 0.01])
-    ranges, bearings = rng.uniform(1, 6, (steps, 3)), rng.uniform(-3, 3, (steps, 3))
-    ranges[rng.random((steps, 3)) < 0.4] = np.nan
-    densities = np.array([1e-3, 1e-5, 1e-4, 1e-5])
-    pose, cov = np.zeros(3), np.diag([0.1, 0.1, 0.1])
-    poses, covs, nis = np.empty((steps, 3)), np.empty((steps, 3, 3)), np.empty((steps, 3))
-    gate = chi_square_quantile(0.999, 2)
-    used = ekf.filter_log(
-        pose, cov, increments, densities, ranges, bearings, landmarks, MOUNT, R, gate, True, poses, covs, nis
-    )
-    p, c, count = np.zeros(3), np.diag([0.1, 0.1, 0.1]), 0
-    known = sighting.Known(np.arange(3), landmarks)
-    for t, (d, a) in enumerate(increments):
-        Q = np.diag([1e-3 * abs(d) + 1e-5 * abs(a), 1e-4 * abs(a) + 1e-5 * abs(d)])
-        ekf.predict(p, c, d, a, Q, True)
-        ids = np.flatnonzero(np.isfinite(ranges[t]))
-        seen = sighting.Seen(ids, ranges[t, ids], bearings[t, ids])
-        count += ekf.update_range_bearings(p, c, seen, known, MOUNT, R, gate)[0]
-        assert (poses[t] == p).all()
-        assert (covs[t] == c).all()
-    assert used == count > 0
-    assert (np.isnan(nis) == np.isnan(ranges)).all()

@@ -16,11 +16,12 @@ from pilotage.experiments.loop import simulate
 from pilotage.experiments.mission import mission_of, read_mission
 from pilotage.experiments.run import run_mission
 from pilotage.kernels.control.closing_in import drive_closes_in
+from pilotage.kernels.control.footprint import discs_clearance
 from pilotage.kernels.geometry.motion import exact_arc
 from pilotage.kernels.scans.rays import fan_ranges
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.maps.world_map import WorldMap
-from pilotage.models.footprint import Footprint
+from pilotage.models.footprint import NO_CORNERS, Footprint
 from pilotage.models.motion.differential_drive import DifferentialDriveConfig
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, Readings
@@ -179,15 +180,36 @@ def test_driving_past_is_no_driving_away() -> None:
     def closes(bearing_rad: float, gap_m: float = 0.05) -> bool:
         away = 0.3 + 0.25 + gap_m
         discs = np.array([[[away * math.cos(bearing_rad), away * math.sin(bearing_rad), 0.25]]] * 4)
-        return bool(drive_closes_in(0.0, 0.0, 0.0, 0.5, 0.0, 0.1, 2.0, 0.05, 0.3, False, discs, 0.1))
+        return bool(drive_closes_in(0.0, 0.0, 0.0, 0.5, 0.0, 0.1, 2.0, 0.05, NO_CORNERS, 0.3, discs, 0.1))
 
     assert closes(0.0)
     assert closes(0.5 * math.pi)
     assert not closes(0.75 * math.pi)
     assert not closes(0.0, gap_m=0.5)
-    # A body that is no disc may not swing its corners into somebody, either.
-    touching = np.array([[[0.4, 0.0, 0.25]]] * 4)
-    assert drive_closes_in(0.0, 0.0, 0.0, 0.0, 1.0, 0.1, 2.0, 0.05, 0.3, True, touching, 0.1)
+
+
+@pytest.mark.parametrize(
+    ("at", "command", "closes"),
+    [
+        ((0.0, 0.42), (0.3, 0.0), False),  # along a side it slides, whose distance does not change
+        ((0.0, 0.42), (-0.3, 0.0), False),
+        ((0.0, 0.42), (0.0, 0.5), True),  # and no corner swings into who is beside it
+        ((0.0, 0.42), (0.0, -0.5), True),
+        ((0.35, 0.42), (0.3, 0.0), True),  # ahead of the side he is run into
+        ((0.35, 0.42), (0.0, 0.5), True),
+        ((0.35, 0.42), (0.0, -0.5), False),  # the side turns away from who is beside its end
+        ((0.5, 0.0), (0.0, 0.5), True),
+        ((0.5, 0.0), (-0.3, 0.0), False),
+        ((0.2, 0.65), (0.3, 0.5), False),  # beyond the margin
+    ],
+)
+def test_corners_slide_along_somebody_and_turn_away_from_him(
+    at: tuple[float, float], command: tuple[float, float], closes: bool
+) -> None:
+    corners = np.array([[0.25, 0.16], [-0.25, 0.16], [-0.25, -0.16], [0.25, -0.16]])
+    discs = np.array([[[*at, 0.25]]] * 4)
+    found = drive_closes_in(0.0, 0.0, 0.0, *command, 0.2, 2.0, 0.05, corners, 0.297, discs, 0.1)
+    assert found == closes
 
 
 HALL: dict[str, Any] = {
@@ -265,7 +287,29 @@ def test_who_has_corners_makes_room_only_where_they_touch_nothing_as_it_turns(be
     makes_room.begin(0.0)
     command = makes_room.step(0.0, Pose2(0.0, 0.0, 0.0), np.array([[0.0, beside_m, 0.03]]))
     assert command is not None
-    assert (command == STOP) == (beside_m < 0.5)
+    assert (command.w_rad_s == 0.0) == (beside_m < 0.5)
+
+
+@pytest.mark.parametrize("beside", [(-0.3, 0.46, 0.25), (0.1, 0.465, 0.25), (0.45, -0.28, 0.2)])
+def test_who_has_corners_gets_away_from_who_presses_against_its_side(
+    beside: tuple[float, float, float],
+) -> None:
+    """Somebody mapped beside it left it neither a plan nor a turn, and it stood until time was up."""
+    corners = np.array([[0.255, 0.215], [-0.255, 0.215], [-0.255, -0.215], [0.255, -0.215]])
+    robot = replace(ROBOT, footprint=Footprint.polygon(corners))
+    bodies = MovingBodies(MovingBodiesConfig(), robot, CHART)
+    makes_room = MakeRoom(MakeRoomConfig(), robot, CHART.field, bodies)
+    makes_room.begin(0.0)
+    pose, somebody = Pose2(0.0, 0.0, 0.0), np.array([beside])
+    assert not makes_room.may_turn(pose, somebody)
+    for k in range(60):
+        command = makes_room.step(0.1 * k, pose, somebody)
+        if command is None or makes_room.may_turn(pose, somebody):
+            break
+        pose = pose.compose(Pose2(0.1 * command.v_m_s, 0.0, 0.1 * command.w_rad_s))
+        gap_m = discs_clearance(pose.x_m, pose.y_m, pose.theta_rad, robot.footprint.points_m, somebody)
+        assert gap_m > -1e-3
+    assert makes_room.may_turn(pose, somebody)
 
 
 @pytest.mark.parametrize(("y_m", "turns"), [(5.6, True), (5.66, False)])
@@ -309,3 +353,44 @@ def test_what_has_stood_for_long_is_a_thing_until_it_moves() -> None:
     assert on_track.all()
     assert not still.any()
     assert movers.foretold(0.1, 0.1, 3).shape[1] == 1
+
+
+def test_corners_are_not_swung_back_where_somebody_may_have_come() -> None:
+    """Somebody followed a rectangle out of its laser's sight, and its rear corner was turned into him."""
+    corners = np.array([[0.25, 0.2], [-0.25, 0.2], [-0.25, -0.2], [0.25, -0.2]])
+    here, turn, arc = Pose2(0.0, 0.0, 0.0), Twist(0.0, 0.5), Twist(0.3, 0.5)
+
+    def allowed(robot: RobotKnowledge, walker: tuple[float, float]) -> tuple[bool, bool]:
+        bodies = MovingBodies(MovingBodiesConfig(), robot, CHART)
+        _watch(bodies, walker, (-1.0, 0.0))
+        gives_way = GiveWay(GiveWayConfig(), robot, bodies)
+        return gives_way.allows(turn, here, NOTHING), gives_way.allows(arc, here, NOTHING)
+
+    far = (4.0, 2.0)
+    sees_all = LidarConfig(beams=539, max_range_m=12.0, field_of_view_rad=2.0 * math.pi)
+    rectangle = replace(ROBOT, footprint=Footprint.polygon(corners))
+    assert allowed(rectangle, far) == (False, True)
+    assert allowed(ROBOT, far) == (True, True)
+    assert GiveWay(GiveWayConfig(), rectangle, MovingBodies(MovingBodiesConfig(), rectangle, CHART)).allows(
+        turn, here, NOTHING
+    )
+    assert not MovingBodies(
+        MovingBodiesConfig(), replace(rectangle, sensors={"lidar": sees_all}), CHART
+    ).may_have_come_to(math.pi)
+
+
+def test_nobody_backs_before_it_has_looked_around() -> None:
+    """A crowd that had come to a stand was backed into half a minute later."""
+    bodies = MovingBodies(MovingBodiesConfig(), ROBOT, CHART)
+    _watch(bodies, (4.0, 2.0), (-1.0, 0.0))
+    first = float(LIDAR.beam_angles_rad()[0])
+
+    def backs_at(t_s: float, theta_rad: float) -> bool:
+        ranges = fan_ranges(0.0, 0.0, theta_rad + first, LIDAR.beam_step_rad, 539, 12.0, WALLS, NOTHING)
+        belief = Belief(Pose2(0.0, 0.0, theta_rad), 1e-6 * np.eye(3))
+        bodies.step(Readings(t_s, {"lidar": LidarScan(ranges)}), belief)
+        return not bodies.may_be_at(math.pi)
+
+    assert not backs_at(5.0, 0.0)
+    assert not backs_at(40.0, 0.0)
+    assert backs_at(40.1, 1.0)

@@ -98,9 +98,10 @@ def test_discs_found_are_the_same_as_discs_told() -> None:
 
 
 def test_a_field_without_geometry_blocks_what_it_says_is_too_near() -> None:
-    cells = np.zeros((40, 40), dtype=bool)
-    cells[20, 20] = True
-    space = space_for(DistanceField.from_grid(OccupancyGrid.of(cells, 0.1)), 0.3)
+    x_m = 0.05 + 0.1 * np.arange(40)
+    away_m = np.hypot(x_m - 2.05, x_m[:, None] - 1.95)
+    nothing = np.zeros((0, 4)), np.zeros((0, 3))
+    space = space_for(DistanceField(away_m, (0.05, 0.05), 0.1, *nothing), 0.3)
     assert slack_at(1.0, 1.95, space, 0.3) > 0.0
     for x in (1.85, 2.0, 2.05, 2.2):
         assert slack_at(x, 1.95, space, 0.3) < 0.0

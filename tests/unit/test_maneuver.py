@@ -8,7 +8,7 @@ import pytest
 from pilotage.core.errors import InputError
 from pilotage.experiments.build.build import build
 from pilotage.experiments.loop import run_loop
-from pilotage.experiments.mission import load_mission
+from pilotage.experiments.mission import load_mission, mission_of, read_mission
 from pilotage.experiments.run import run_mission
 from pilotage.stack.navigator.maneuver import ManeuverConfig, ManeuverNavigator
 from pilotage.stack.navigator.navigator import Parts
@@ -53,3 +53,21 @@ def test_what_it_lacks_is_said() -> None:
     parts = Parts(None, None, None, None, None, None, None, None)
     with pytest.raises(InputError, match=r"stack\.planner"):
         told.navigator(ManeuverNavigator, ManeuverConfig(), parts)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_who_knows_its_place_by_satellites_gets_on_though_its_estimate_jumps(seed: int) -> None:
+    """After eight fixes it gave up: "it cannot keep to its plans", though it had kept to them."""
+    walls = [[0, 0, 30, 0], [30, 0, 30, 20], [30, 20, 0, 20], [0, 20, 0, 0]]
+    settings = {
+        "world.map": {"map": "yard", "walls_m": walls},
+        "world.start": {"x_m": 6.0, "y_m": 10.0, "theta_rad": 0.0},
+        "world.goal": {"x_m": 24.0, "y_m": 10.0, "theta_rad": 0.0, "tolerance_m": 3.0, "tolerance_rad": 0.6},
+        "robot.sensors.lidar": None,
+        "robot.sensors.gps": {"name": "gps", "rate_hz": 5, "position_std_m": 2.0, "bias_std_m": 0.5},
+        "stack.localizer": {"name": "ekf-gps"},
+        "stack.initial": {"x_var_m2": 1.0, "y_var_m2": 1.0, "theta_var_rad2": 0.06},
+    }
+    metrics = run_mission(mission_of(read_mission("car-park"), (), seed, settings), save=False).metrics
+    assert metrics["success"], metrics["reason"]
+    assert int(str(metrics["replans"])) > 8

@@ -13,7 +13,6 @@ from pilotage.core.errors import InputError
 from pilotage.core.types import Pose2
 from pilotage.experiments.build.charts import bounds_of
 from pilotage.kernels.geometry import nearest
-from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.nearest_obstacles import NearestObstacles
 from pilotage.maps.occupancy_grid import OccupancyGrid
 from pilotage.maps.segment_map import SegmentMap
@@ -71,28 +70,8 @@ def grid(theta: float = 0.0) -> OccupancyGrid:
     return OccupancyGrid.of(cells, 0.1, Pose2(-1.0, 2.0, theta))
 
 
-@pytest.mark.parametrize("theta", [0.0, 0.5, -2.0])
-def test_a_grids_field_is_the_brute_force_one(theta: float) -> None:
-    some = grid(theta)
-    occupied = some.centres_m(np.argwhere(some.blocked()))
-    rng = np.random.default_rng(0)
-    cells = rng.integers(2, [38, 58], size=(300, 2))
-    points = some.centres_m(cells)
-    brute = np.hypot(*(points[:, None] - occupied[None]).transpose(2, 0, 1)).min(axis=1)
-    found = DistanceField.from_grid(some).at(points)
-    # Straight: the nodes are the centres. Turned: interpolated twice, half a diagonal off at most.
-    assert found == pytest.approx(brute, abs=1e-9 if theta == 0.0 else 0.071)
-
-
-def test_unknown_cells_block_unless_they_are_said_to_be_free() -> None:
-    corner = grid().centres_m(np.array([[1, 1]]))
-    assert DistanceField.from_grid(grid()).at(corner)[0] == 0.0
-    assert DistanceField.from_grid(grid(), unknown_is_free=True).at(corner)[0] > 0.9
-
-
-def test_an_empty_grid_is_as_far_from_obstacles_as_it_is_wide() -> None:
+def test_an_empty_grid_has_nothing_that_is_nearest() -> None:
     empty = OccupancyGrid.of(np.zeros((3, 4), dtype=np.int8), 0.5)
-    assert DistanceField.from_grid(empty).distance_m == pytest.approx(np.full((3, 4), 2.5))
     chart = WorldMap("empty", (0.0, 0.0, 2.0, 1.5), grid=empty)
     with pytest.raises(InputError, match="walls or discs"):
         NearestObstacles.from_map(chart.walls, 0.1)

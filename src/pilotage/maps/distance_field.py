@@ -10,8 +10,6 @@ import numpy as np
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
 from pilotage.kernels.geometry import field
-from pilotage.maps.memory import require_memory
-from pilotage.maps.occupancy_grid import OccupancyGrid, squared_distances
 from pilotage.maps.segment_map import SegmentMap
 
 MAX_NODES = 50_000_000
@@ -78,32 +76,6 @@ class DistanceField:
         values = field.sample_distance(xmin, ymin, resolution_m, nx, ny, world.segments_m, world.circles_m)
         return DistanceField(values, (xmin, ymin), resolution_m, world.segments_m, world.circles_m)
 
-    @staticmethod
-    def from_grid(grid: OccupancyGrid, unknown_is_free: bool = False) -> DistanceField:
-        """Exact distances between cell centres, to the nearest blocked cell; the nodes are the centres.
-
-        A grid without a blocked cell is as far from obstacles as it is wide: its diagonal everywhere. Of a
-        grid that is turned, the field spans the bounds; nodes beside the grid have distance 0.
-
-        Raises
-        ------
-        InputError
-            Where memory does not suffice.
-        """
-        blocked = grid.blocked(unknown_is_free=unknown_is_free)
-        require_memory(32 * blocked.size, "the distance field of a grid")
-        if blocked.any():
-            cells = np.sqrt(squared_distances(blocked).astype(np.float64))
-        else:
-            cells = np.full(blocked.shape, math.hypot(*blocked.shape))
-        # A grid's first row is its top one, a field's the lowest.
-        distance = np.ascontiguousarray(grid.resolution_m * cells[::-1])
-        half = 0.5 * grid.resolution_m
-        if grid.origin.theta_rad == 0.0:
-            origin = (grid.origin.x_m + half, grid.origin.y_m + half)
-            return DistanceField(distance, origin, grid.resolution_m, np.zeros((0, 4)), np.zeros((0, 3)))
-        return _turned(distance, grid)
-
     @property
     def bounds_m(self) -> tuple[float, float, float, float]:
         """xmin, ymin, xmax, ymax that the nodes span."""
@@ -124,21 +96,3 @@ class DistanceField:
         """Interpolated distance at points (K, 2); outside the grid 0. Returns (K,)."""
         points = np.ascontiguousarray(points_xy_m, dtype=np.float64).reshape(-1, 2)
         return field.interpolate(points, self.distance_m, *self.origin_xy_m, self.resolution_m)
-
-
-def _turned(distance: FloatArray, grid: OccupancyGrid) -> DistanceField:
-    """Resample distances at the cells of a turned grid on nodes that stand straight."""
-    resolution, half = grid.resolution_m, 0.5 * grid.resolution_m
-    c, s = math.cos(grid.origin.theta_rad), math.sin(grid.origin.theta_rad)
-    width, height = grid.size_m
-    corners = np.array([[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]])
-    turn = np.array([[c, s], [-s, c]])
-    x, y = (corners @ turn).T
-    x0, y0 = grid.origin.x_m + float(x.min()), grid.origin.y_m + float(y.min())
-    nx, ny = math.ceil(float(np.ptp(x)) / resolution) + 1, math.ceil(float(np.ptp(y)) / resolution) + 1
-    require_memory(64 * nx * ny, "the distance field of a turned grid")
-    nodes_x, nodes_y = np.meshgrid(x0 + resolution * np.arange(nx), y0 + resolution * np.arange(ny))
-    offset = np.column_stack([nodes_x.ravel() - grid.origin.x_m, nodes_y.ravel() - grid.origin.y_m])
-    own = np.ascontiguousarray(offset @ turn.T)
-    values = field.interpolate(own, distance, half, half, resolution).reshape(ny, nx)
-    return DistanceField(values, (x0, y0), resolution, np.zeros((0, 4)), np.zeros((0, 3)))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from pilotage.kernels.arrays import FloatArray
+from pilotage.kernels.bodies.outline import signed_distance
 from pilotage.kernels.control.footprint import polygon_distance
 from pilotage.kernels.geometry.motion import wrap
 from pilotage.kernels.jit import kernel
@@ -77,17 +78,18 @@ def drive_closes_in(
     hold: float,
     deceleration: float,
     dt: float,
+    corners: FloatArray,
     radius: float,
-    swings: bool,
     movers: FloatArray,
     keep: float,
 ) -> bool:
-    """Whether a command, held and then braked from along its arc, brings a disc nearer to somebody.
+    """Whether a command, held and then braked from along its arc, brings an outline nearer to somebody.
 
     ``movers`` (K, M, 3): discs at dt, 2 dt, ...; beyond the last ones time stands. Only those count that are
     within ``keep`` by then, and each stands while the robot moves: who drives away, and not merely past
-    (``AWAY``: places are vague), closes no gap. ``swings``: a body in the disc that is no disc itself may
-    not turn there either.
+    (``AWAY``: places are vague), closes no gap. ``corners`` (C, 2), of none for a disc of that radius: their
+    sides may slide along somebody, whose place then does not matter, but they turn only away from him; a
+    middle inside the outline is nobody's.
     """
     rate = w / v if v != 0.0 else 0.0
     speed, t = v, 0.0
@@ -103,11 +105,28 @@ def drive_closes_in(
         discs = movers[min(k, movers.shape[0] - 1)]
         for i in range(discs.shape[0]):
             px, py = discs[i, 0], discs[i, 1]
-            after = math.hypot(px - nx, py - ny)
-            if after >= radius + discs[i, 2] + keep:
+            after = math.hypot(px - nx, py - ny) - radius
+            if after >= discs[i, 2] + keep:
                 continue
-            gained = after - math.hypot(px - x, py - y)
-            if (swings and turn != 0.0) or gained < AWAY * abs(speed) * dt:
+            if corners.shape[0] == 0:
+                gained, least = after + radius - math.hypot(px - x, py - y), AWAY * abs(speed) * dt
+            else:
+                after = _gap(px - nx, py - ny, theta + turn, corners)
+                if after >= discs[i, 2] + keep:
+                    continue
+                before = _gap(px - x, py - y, theta, corners)
+                if before < 0.0:
+                    continue
+                gained = after - before
+                least = AWAY * radius * abs(turn) - CLOSES_M
+            if gained < least:
                 return True
         x, y, theta, t = nx, ny, theta + turn, t + dt
     return True
+
+
+@kernel
+def _gap(dx: float, dy: float, theta: float, corners: FloatArray) -> float:
+    """Signed distance of a point, seen from the base but not turned, to an outline that is."""
+    c, s = math.cos(theta), math.sin(theta)
+    return signed_distance(c * dx + s * dy, c * dy - s * dx, corners)

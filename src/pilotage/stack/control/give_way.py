@@ -32,9 +32,8 @@ class GiveWayConfig(Config):
 class GiveWay:
     """Says whether a command, and the stop after it, leaves those who walk alone.
 
-    A robot of any shape is taken for the disc around it. Driving away from somebody is always allowed, and so
-    is standing; backing where the laser does not look is not, while people walk about. Brakes are those of
-    the data sheet.
+    Driving away from somebody is always allowed, and so is standing; backing where the laser does not look is
+    not, nor swinging a corner back there, while people walk about. Brakes are those of the data sheet.
     """
 
     def __init__(self, config: GiveWayConfig, robot: RobotKnowledge, bodies: MovingBodies) -> None:
@@ -42,13 +41,18 @@ class GiveWay:
         motion = robot.motion
         self._delay_s = motion.delay_s
         self._braking_m_s2 = min(motion.braking_m_s2, motion.top_speed_m_s / robot.dt_s)
-        self._radius_m, self._swings = robot.radius_m, not robot.footprint.is_disc
+        self._footprint = robot.footprint
+        self._half_width_m = float(np.abs(robot.footprint.points_m[:, 1]).max(initial=0.0))
 
     def allows(self, command: Twist, pose: Pose2, mapped_m: FloatArray) -> bool:
         """Whether the command closes in on nobody; ``mapped_m`` (N, 3) discs are things."""
-        if command.v_m_s == 0.0 and not (self._swings and command.w_rad_s):
+        if command.v_m_s == 0.0 and (self._footprint.is_disc or command.w_rad_s == 0.0):
             return True
         if command.v_m_s < 0.0 and self._bodies.may_be_at(math.pi):
+            return False
+        if command.v_m_s < abs(command.w_rad_s) * self._half_width_m and self._bodies.may_have_come_to(
+            math.pi
+        ):
             return False
         if not self._bodies.about:
             return True
@@ -64,8 +68,8 @@ class GiveWay:
             self._config.hold_s + self._delay_s,
             self._braking_m_s2,
             CHECK_STEP_S,
-            self._radius_m,
-            self._swings,
+            self._footprint.points_m,
+            self._footprint.radius_m,
             np.ascontiguousarray(discs),
             self._config.keep_m,
         )

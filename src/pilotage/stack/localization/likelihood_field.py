@@ -21,7 +21,10 @@ from pilotage.stack.localization.odometry_watch import TURN_AS_PATH_M
 WALL_STD_M, GRID_SHARE = 0.01, 1.0 / 3.0
 """What walls are wrong by, and of cells which share of their side, beyond the cell itself."""
 INDEPENDENT_SHARE = 0.25
-"""Of a scan's beams on cells: those on one wall end where its cells were drawn, together."""
+"""Of a scan's beams that err alike: on cells those on one wall end where its cells were drawn, together."""
+VAGUE_M = 0.2
+"""Of beams that are told no better than this many end beside another wall than they met: the field errs, and
+in every scan from there alike."""
 ALIKE_M, LEAST_MOVE_M = 3.0, 0.03
 """Path over which the cells in sight, and so their errors, become others; who stands still counts as one who
 moves a little: people and noise differ from scan to scan."""
@@ -48,8 +51,8 @@ class LikelihoodField:
 
     Attributes
     ----------
-    on_cells
-        Whether it is one of a grid's cells.
+    errs_alike
+        Whether scans from one place err alike: on a grid's cells, and where beams are told vaguely.
     independent_share
         Power of a scan's likelihood that is as informative as its beams are together.
     least_at_wall, least_beside
@@ -67,8 +70,6 @@ class LikelihoodField:
         reach_m: float,
     ) -> None:
         on_cells = chart.geometry is None and chart.grid is not None and not chart.open_ground
-        self.on_cells = on_cells
-        self.independent_share = INDEPENDENT_SHARE if on_cells else 1.0
         half_m, least_std_m, walls = 0.0, WALL_STD_M, chart.reflectors
         if on_cells and chart.grid is not None:
             half_m, least_std_m = 0.5 * chart.grid.resolution_m, GRID_SHARE * chart.grid.resolution_m
@@ -87,6 +88,8 @@ class LikelihoodField:
                 "particle-filter: a scanner without noise leaves the filter no measurement variance; "
                 "set stack.localizer.range_var_m2 or field_std_m above 0"
             )
+        self.errs_alike = on_cells or std_m > VAGUE_M
+        self.independent_share = INDEPENDENT_SHARE if self.errs_alike else 1.0
         self._step_m = std_m / TABLE_PER_STD
         inside = round(half_m / self._step_m)
         z = np.maximum(np.arange(inside + TABLE_STDS * TABLE_PER_STD + 1) - inside, 0) / TABLE_PER_STD
@@ -127,7 +130,7 @@ class LikelihoodField:
         Uhlmann 1997; for densities Hurley 2002). No number of scans from one place then tells more than one
         of them.
         """
-        if not self.on_cells:
+        if not self.errs_alike:
             return 0.0
         path_m = moved_m + TURN_AS_PATH_M * turned_rad
         return math.exp(-max(path_m, LEAST_MOVE_M) / ALIKE_M)

@@ -270,7 +270,7 @@ class ParticleFilterLocalizer:
         moved_m, turned_rad = self._moved
         stands = moved_m + TURN_AS_PATH_M * turned_rad < STANDS_M
         self._alike = self._alike + 1 if stands else 0
-        return not self._field.on_cells and self._alike > MOST_ALIKE
+        return not self._field.errs_alike and self._alike > MOST_ALIKE
 
     def _weigh(self, points: FloatArray, prior_cov: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Weigh and resample the cloud by a scan's end points (K, 2) in the robot's frame; returns the

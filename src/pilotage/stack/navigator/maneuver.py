@@ -41,8 +41,11 @@ from pilotage.stack.planning.planner import Path, PlanResult
 
 MOST_REPLANS, MOST_RESTS = 8, 3
 """How often it plans anew where it went astray, and for what a path that covers a floor left of it."""
+SURE = 0.5
+"""A place that is known better than to this share of what is astray: a standard deviation."""
 LOOK_S = 2.0
-"""A robot that believes to stand in a wall looks around for so long before it plans anew, once."""
+"""A robot that believes to stand in a wall looks around for so long before it plans anew: once, or until it
+knows its place."""
 BESIDE_INNER_M = (0.25, 0.2, 0.15, 0.08, 0.04, 0.01)
 """What paths planned for the centre keep beside the outline's inner disc, where they can keep no more."""
 HEADING_PER_S = 3.0
@@ -139,7 +142,7 @@ class ManeuverNavigator(LocalizingNavigator):
         plan = self._plan
         result = self._planned(t_s)
         looked, self._think_at_s = self._think_at_s > 0.0, math.inf
-        if result.status is PlanStatus.START_BLOCKED and not looked:
+        if result.status is PlanStatus.START_BLOCKED and not (looked and self._is_sure):
             self._think_at_s = t_s + LOOK_S
             return
         if result.path is None or plan.path is None:
@@ -318,9 +321,15 @@ class ManeuverNavigator(LocalizingNavigator):
         self._journal.say(t_s, "rest", f"what was driven left some of it: {result.reason}")
         return True
 
+    @property
+    def _is_sure(self) -> bool:
+        """Whether a place that it should not be at is where it is, not what its estimate jumped to."""
+        return self.belief.std_m < SURE * self._config.astray_m
+
     def _astray(self, t_s: float) -> Twist:
+        """Plan anew; what a vague estimate's jumps ask for does not count against it."""
         self._yielding.forget()
-        self._replans += 1
+        self._replans += self._is_sure
         if self._replans > MOST_REPLANS:
             self._end(t_s, StackStatus.FAILED, "stuck: it cannot keep to its plans")
         else:

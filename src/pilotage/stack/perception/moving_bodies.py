@@ -24,6 +24,8 @@ from pilotage.stack.perception.unexplained import UnexplainedReturns
 
 VAGUE_M = 0.3
 """Standard deviation of a track's place: what is found in the gate of a vaguer one may be another thing."""
+LOOKED_RAD, LOOKED_M = 0.8, 1.0
+"""Having turned or driven so far, it has seen what was behind it, or left it there."""
 NEAR_M = 2.0
 """What stands so near for a while is on the map of whoever maps."""
 
@@ -44,7 +46,7 @@ class MovingBodiesConfig(Config):
     about_s: NonNegative = 10.0
     """For so long it reckons with people after it saw one who walks, or walked a moment ago."""
     backs_after_s: NonNegative = 30.0
-    """For so long it does not drive where its laser does not look."""
+    """For so long it does not drive where its laser does not look, and not before it has looked around."""
     anyone_m_s: NonNegative = 1.0
     """So fast may come who is not tracked."""
     beside_m: NonNegative = 1.0
@@ -92,6 +94,7 @@ class MovingBodies:
         self._mates = mates
         self._walks: BoolArray = np.zeros(0, np.bool_)
         self._t_s = self.seen_s = -math.inf
+        self._seen_from, self._looked = Pose2(0.0, 0.0, 0.0), True
         self._field = 0.0, 0.0
         self._scans = 0
         self.shown_scans, self.shown_m = 0, math.inf
@@ -126,6 +129,8 @@ class MovingBodies:
             points, beams = points[near], beams[near]
         dt_s = min(max(readings.t_s - self._t_s, 1e-3), 1.0)
         self._t_s = readings.t_s
+        off = self._seen_from.inverse().compose(pose)
+        self._looked |= abs(off.theta_rad) > LOOKED_RAD or math.hypot(off.x_m, off.y_m) > LOOKED_M
         if not len(points) and not len(self._movers.tracks):
             self._loose, self.shown_scans = points, 0
             return readings
@@ -135,7 +140,7 @@ class MovingBodies:
         # Before the first one is known nothing is taken for somebody of which only a moving part is seen.
         whole = np.ones(len(points), np.bool_) if self.about else ~self._cut_off(points, beams, scan.ranges_m)
         of_track[whole] = self._movers.track(x, y, pose.theta_rad, points[whole], dt_s, self._field)
-        self._walks = self._told(x, y, first, scan.ranges_m)
+        self._walks = self._told(pose, x, y, first, scan.ranges_m)
         walks = np.append(self._walks, False)[of_track]
         self._loose = points[walks | (of_track < 0)]
         self._scans += 1
@@ -172,7 +177,7 @@ class MovingBodies:
         )
         return cut
 
-    def _told(self, x_m: float, y_m: float, first_rad: float, ranges_m: FloatArray) -> BoolArray:
+    def _told(self, pose: Pose2, x_m: float, y_m: float, first_rad: float, ranges_m: FloatArray) -> BoolArray:
         """Which tracks do not stand; notes when somebody is there who walks beyond doubt, or did.
 
         What a moving robot sees of a long thing around a corner, or through a gap, moves as well: somebody
@@ -195,7 +200,7 @@ class MovingBodies:
             config.parks_readings,
         )
         if people:
-            self.seen_s = self._t_s
+            self.seen_s, self._seen_from, self._looked = self._t_s, pose, False
         told: BoolArray = walks
         return told
 
@@ -234,10 +239,16 @@ class MovingBodies:
 
     def may_be_at(self, bearing_rad: float) -> bool:
         """Whether somebody may be in a direction of the base's frame in which the laser does not look."""
-        if not self._works:
-            return False
-        sees = is_in_view(bearing_rad, *self._field, self._step)
-        return not sees and (self._mates > 0 or self._t_s - self.seen_s < self._config.backs_after_s)
+        stands = self._works and not self._sees(bearing_rad) and (self._mates > 0 or not self._looked)
+        return stands or self.may_have_come_to(bearing_rad)
+
+    def may_have_come_to(self, bearing_rad: float) -> bool:
+        """The same, of those alone who walked about not long ago."""
+        recent = self._works and self._t_s - self.seen_s < self._config.backs_after_s
+        return recent and not self._sees(bearing_rad)
+
+    def _sees(self, bearing_rad: float) -> bool:
+        return is_in_view(bearing_rad, *self._field, self._step)
 
     def discs_m(self) -> FloatArray:
         """(M, 3) where they are now, of their own size."""

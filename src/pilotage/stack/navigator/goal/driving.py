@@ -107,7 +107,8 @@ def _guarded(context: Context, state: Driving, readings: Readings, pose: Pose2) 
         if _allows(context, pose, move.command):
             return move
     if isinstance(move.state, Avoiding):
-        return Move(move.state, Twist(0.0, move.command.w_rad_s))
+        turn = Twist(0.0, move.command.w_rad_s)
+        return Move(move.state, turn if _allows(context, pose, turn) else STOP)
     tried = context.again > 0 and context.planned_here(pose)
     slower = _slower(context, pose, move.command) if tried else None
     if slower is not None:

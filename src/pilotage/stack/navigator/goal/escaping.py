@@ -111,7 +111,10 @@ class Escaping:
                 context.reactive.reset()
             return replan(context, self.resumes, pose, "backed out")
         own, room_m = context.own_map, context.radius_m + HERE_TOLERANCE_M
-        if context.guard.allows(command, pose, own.barriers, own.known_circles_m, room_m):
+        guard, walls = context.guard, own.barriers
+        if guard.allows(command, pose, walls, own.known_circles_m, room_m) and guard.corners_may(
+            command, pose, walls, own.circles_m
+        ):
             return Move(self, STOP if context.waits(command, pose) else command)
         return replan(context, self.resumes, pose, "the way back is blocked")
 
@@ -121,11 +124,12 @@ def begin_escape(context: Context, resumes: State, pose: Pose2, why: str, waits:
 
     Among people, and where the first one may have come along, it waits instead: a robot that backs out sees
     nobody behind it. Having waited so often it makes room. With a mate behind it, who may have followed
-    unseen, it turns on the spot and looks for a path from there.
+    unseen, it turns on the spot and looks for a path from there, if it can.
     """
-    if context.among_people and waits <= 0 and context.helps_to_make_room(pose):
+    shut_in = context.turns_on_the_spot and not (context.may_back or context.may_turn(pose))
+    if waits <= 0 and (context.among_people or shut_in) and context.helps_to_make_room(pose):
         return make_room(context, resumes, f"{why}: making room, as somebody walks about")
-    if context.among_people or (waits > 0 and context.meets_something_new(pose)):
+    if context.among_people or (waits > 0 and (shut_in or context.meets_something_new(pose))):
         context.follower.drop()
         context.say("wait", f"{why}: waiting, as somebody may walk about")
         return Move(Waiting(context, resumes, context.t_s + context.config.give_way.patience_s, waits), STOP)
