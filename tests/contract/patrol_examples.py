@@ -29,6 +29,7 @@ STRATEGY_NUMBERS: dict[str, frozenset[str]] = {
             "sharing_cost",
             "forecast_mean_weight",
             "forecast_sharing_cost",
+            "jam_late_ratio",
             "late_ratio",
             "slack",
         }

@@ -23,6 +23,8 @@ PROMPT = Driving(
     late_ratio=0.0,
     slack=0.5,
     most_slack=0.1,
+    jam_late_ratio=0.0,
+    jam_meeting_m=0.0,
     beside_m=0.5,
     talks=True,
 )
@@ -98,6 +100,24 @@ def test_who_meet_in_a_door_wait_and_who_go_round_one_way_do_not() -> None:
     assert forecast_m(one_way, graph, passages, PROMPT) == forecast_m(one_way, graph, OPEN, PROMPT)
     contrary, late = plan_of(graph, (there, 3), (back, 3)), replace(PROMPT, late_ratio=0.3)
     assert forecast_m(contrary, graph, passages, late)[1] > forecast_m(contrary, graph, OPEN, late)[1]
+
+
+def test_rounds_that_fit_while_all_are_on_time_are_charged_for_what_meetings_cost_the_late() -> None:
+    """Three to and fro through a door that none of them comes to while another does, if all are on time."""
+    floor = walled(30, 5, (11, 0, 11, 2), (11, 3, 11, 5))
+    graph, passages = row(floor, (1.0, 2.5), (6.0, 2.5), (20.0, 2.5), (29.0, 2.5))
+    three = plan_of(graph, ([0, 1, 2, 3, 2, 1], 3))
+    fitting = forecast_m(three, graph, OPEN, PROMPT)
+    assert forecast_m(three, graph, passages, PROMPT) == fitting
+    jams = replace(PROMPT, jam_late_ratio=0.5, jam_meeting_m=8.0)
+    worst_m, mean_m = forecast_m(three, graph, passages, jams)
+    assert worst_m > fitting[0] + 2.0
+    assert mean_m > fitting[1]
+    assert forecast_m(three, graph, OPEN, jams) == fitting
+
+    graph, passages = two_doors()
+    one_way = plan_of(graph, ([0, 1, 2, 3], 3))
+    assert forecast_m(one_way, graph, passages, jams) == forecast_m(one_way, graph, passages, PROMPT)
 
 
 @pytest.mark.parametrize("size", [2, 3, 5])

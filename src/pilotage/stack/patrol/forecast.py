@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 
+from pilotage.core.types import FloatArray
 from pilotage.kernels.patrol import traffic
 from pilotage.kernels.patrol.rounds import turned_m
 from pilotage.stack.patrol.graph import PatrolGraph
@@ -39,6 +40,8 @@ class Driving:
         What waiting before a passage takes longer.
     late_ratio, slack, most_slack
         How late legs are, and when robots of a round wait for who is late.
+    jam_late_ratio, jam_meeting_m
+        Both of what robots are late by where they jam.
     beside_m
         At a vertex in a passage, or no farther beside one, nobody waits.
     talks
@@ -51,6 +54,8 @@ class Driving:
     late_ratio: float
     slack: float
     most_slack: float
+    jam_late_ratio: float
+    jam_meeting_m: float
     beside_m: float
     talks: bool
 
@@ -61,8 +66,26 @@ def forecast_m(plan: Plan, graph: PatrolGraph, passages: Passages, driving: Driv
 
     Robots begin evenly spread on their rounds. Of passages with room for one those who come the other way
     are kept out (``Section``), in the order in which they came; who comes the same way follows.
+
+    Rounds may fit into each other such that nobody meets anybody while all are on time. Where they come
+    through passages against each other at all, what meetings cost those who are later is added.
     """
     walks = _walks(plan, graph, passages, driving)
+    usual_m = _driven_m(plan, walks, driving)
+    if len(walks.mouths):
+        late = replace(driving, late_ratio=driving.jam_late_ratio, meeting_m=driving.jam_meeting_m)
+        alone = walks._replace(
+            first_section=np.zeros_like(walks.first_section),
+            mouths=np.zeros(0),
+            through=np.zeros(0),
+            until=np.zeros((0, 0)),
+        )
+        usual_m = usual_m + np.maximum(_driven_m(plan, walks, late) - _driven_m(plan, alone, late), 0.0)
+    return float(usual_m[0]), float(usual_m[1])
+
+
+def _driven_m(plan: Plan, walks: traffic.Walks, driving: Driving) -> FloatArray:
+    """(2,) worst and mean, on average."""
     group = np.repeat(np.arange(len(plan.rounds)), plan.sizes)
     lengths = np.repeat([walk.length_m for walk in plan.rounds], plan.sizes)
     place = np.concatenate([np.arange(size) / size for size in plan.sizes])
@@ -84,8 +107,7 @@ def forecast_m(plan: Plan, graph: PatrolGraph, passages: Passages, driving: Driv
     driven = [
         traffic.drive_rounds(walks, group, place * lengths, rng.random(LEGS), manner) for _ in range(TIMES)
     ]
-    worst_m, mean_m = np.mean(driven, axis=0).tolist()
-    return worst_m, mean_m
+    return np.asarray(np.mean(driven, axis=0))
 
 
 def _walks(plan: Plan, graph: PatrolGraph, passages: Passages, driving: Driving) -> traffic.Walks:

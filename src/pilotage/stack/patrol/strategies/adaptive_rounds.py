@@ -37,8 +37,10 @@ class AdaptiveRoundsConfig(Config):
     ``forecast_sharing_cost`` of that more where robots share a round, for what it does not know. In it
     legs take up to ``late_ratio`` longer at random, who has waited before a passage that has room for one
     takes ``meeting_m`` of driving longer, and turning back takes ``late_m`` more than data sheets say, for
-    decisions are made a few times a second. A round on which robots are nearer to each other than
-    ``headway_m``, who watch and avoid each other all the time, is taken only where there is no other.
+    decisions are made a few times a second. Where robots come through such passages against each other, what
+    that costs is added as it is while they are ``jam_late_ratio`` late and waiting takes ``jam_meeting_m``:
+    now and then they stand in each other's way for long. A round on which robots are nearer to each other
+    than ``headway_m``, who watch and avoid each other all the time, is taken only where there is no other.
 
     A robot waits while it is further ahead of its place among those that share its round than ``slack`` of a
     mean leg between stops, within which nobody knows where the others are, or ``most_slack`` of the time
@@ -52,6 +54,8 @@ class AdaptiveRoundsConfig(Config):
     forecast_sharing_cost: NonNegative = 0.03
     late_ratio: NonNegative = 0.25
     meeting_m: NonNegative = 2.5
+    jam_late_ratio: NonNegative = 0.5
+    jam_meeting_m: NonNegative = 8.0
     late_m: NonNegative = 0.4
     headway_m: NonNegative = 6.0
     slack: Positive = 0.5
@@ -87,6 +91,8 @@ def best_plan(setting: PatrolSetting, robots: int, config: AdaptiveRoundsConfig)
         late_ratio=config.late_ratio,
         slack=config.slack,
         most_slack=config.most_slack,
+        jam_late_ratio=config.jam_late_ratio,
+        jam_meeting_m=config.jam_meeting_m,
         beside_m=config.beside_passage_m,
         talks=setting.talks,
     )
