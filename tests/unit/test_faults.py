@@ -168,6 +168,23 @@ class TestWatching:
             waits.append(t_s - begin)
         assert waits == pytest.approx([HOLD_S, 2 * HOLD_S, 4 * HOLD_S], abs=0.11)
 
+    @pytest.mark.parametrize(
+        ("elsewhere", "nis", "counts"), [(True, 3.0, True), (True, 12.0, False), (False, 3.0, False)]
+    )
+    def test_a_place_counts_where_its_own_updates_agree(
+        self, elsewhere: bool, nis: float, counts: bool
+    ) -> None:
+        """What the last place was told does not count against one elsewhere, but does against the same."""
+        check = SelfCheck()
+        for k in range(30):
+            check.tell(0.1 * k, 50, 40, 12.0, 3.0)
+        check.try_anew(elsewhere)
+        for k in range(30, 45):
+            check.tell(0.1 * k, 50, 50, nis, 3.0)
+        assert check.begin_anew(4.5) is counts
+        assert check.lost(4.5) is not counts
+        assert check.lost(4.4 + 1.5 * HOLD_S) is not counts  # told another motion than the robot's: longer
+
     def test_readings_in_their_band_say_nothing(self) -> None:
         """Of chi-square NIS: 6 sigma of the sum over the window, a false alarm in some 1e9 updates."""
         rng, check = np.random.default_rng(2), SelfCheck()

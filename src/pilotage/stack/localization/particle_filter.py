@@ -213,7 +213,10 @@ class ParticleFilterLocalizer:
             lost |= self._relocalization.trial is not None
             if isinstance(scan, LidarScan):
                 self._relocalization.see(seen)
+            tried = self._relocalization.trial
             place = self._relocalization.begin(t_s, lost, mean)
+            if self._relocalization.trial is not tried:
+                self._check.try_anew(elsewhere=place is not None)
             if place is not None:
                 mean, cov = self._begin_at(place)
         self.belief = Belief(
@@ -343,12 +346,11 @@ class ParticleFilterLocalizer:
         share, weight = at_wall / len(points), len(points) / len(self._picked)
         again = self._relocalization
         passed = None if again is None else again.passed(share, weight, self._explained.usual)
-        if passed:
-            self._check.begin_anew(t_s)
+        if passed and self._check.begin_anew(t_s):
             self._found = True
             self._explained.begin_anew()
             self._sharp.begin_anew()
-        elif passed is not None:
+        elif passed is False:
             self._check.alarm(t_s)
         if self._check.lost(t_s) or prior[1][0, 0] + prior[1][1, 1] > UNSURE_M**2:
             self._found = False

@@ -55,7 +55,7 @@ class SelfCheck:
         self._sums = [0.0, 0.0, 0.0, 0.0]
         self._windows: list[tuple[float, ...]] | None = None if noise_share is None else []
         self._count, self._own_share, self._own_nis = 0, 1.0, 1.0
-        self._hold_s, self._until_s = HOLD_S, -math.inf
+        self._hold_s, self._until_s, self._amiss = HOLD_S, -math.inf, False
 
     def tell(self, t_s: float, seen: int, accepted: int, nis: float, expected: float) -> None:
         """One update: readings of known things, those accepted, their NIS summed, and its mean."""
@@ -73,6 +73,7 @@ class SelfCheck:
         # Chi-square values add up to one of as many degrees of freedom as their mean, of twice the variance.
         excess = max(NIS_EXCESS, NIS_SIGMAS * math.sqrt(2.0 / max(mean, 1.0)))
         if share < self._used_share * self._own_share or ratio > (1.0 + excess) * self._own_nis:
+            self._amiss = True
             self.alarm(t_s)
         self._count += 1
         if self._windows is not None and self._count % WINDOW == 0:
@@ -102,13 +103,26 @@ class SelfCheck:
             self._hold_s = min(2.0 * self._hold_s, MOST_HOLD_S) if soon else HOLD_S
         self._until_s = t_s + self._hold_s
 
-    def begin_anew(self, t_s: float) -> None:
-        """The filter has taken another place, which has stood its trial: what spoke against the last one says
-        nothing of this one. Who had to withdraw its word soon after it gave it waits nevertheless."""
-        self._updates.clear()
-        self._sums = [0.0, 0.0, 0.0, 0.0]
-        if self._hold_s <= HOLD_S:
+    def try_anew(self, elsewhere: bool) -> None:
+        """A place is tried; what spoke against the last one says nothing of one elsewhere."""
+        self._amiss = False
+        if elsewhere:
+            self._updates.clear()
+            self._sums = [0.0, 0.0, 0.0, 0.0]
+
+    def begin_anew(self, t_s: float) -> bool:
+        """The scans fit at the place on trial; returns whether its updates agree with each other too.
+
+        Where they do not, as of readings out of order, the filter is told another motion than the robot's:
+        that the scans fit does not mend that, and it waits for longer. So does who had to withdraw its word
+        soon after it gave it.
+        """
+        if self._amiss:
+            self._hold_s = min(2.0 * self._hold_s, MOST_HOLD_S)
+            self._until_s = max(self._until_s, t_s + self._hold_s)
+        elif self._hold_s <= HOLD_S:
             self._until_s = min(self._until_s, t_s)
+        return not self._amiss
 
     def lost(self, t_s: float) -> bool:
         """Whether the filter is not to be believed now."""
