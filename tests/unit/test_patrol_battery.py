@@ -13,6 +13,7 @@ from pilotage.experiments.build.build import build, build_source
 from pilotage.experiments.disturbances import Disturbances
 from pilotage.experiments.loop import run_loop
 from pilotage.experiments.mission import load_mission, mission_of
+from pilotage.face.stepping import Simulation
 from pilotage.stack.navigator.patrol.config import Mode
 from support.missions import MISSIONS
 
@@ -104,6 +105,35 @@ def test_who_cannot_be_put_down_yet_keeps_nobody_else_waiting_and_each_is_named(
         source.simulator.step([STOP, STOP])
         told += [event.text for event in disturbances.due()]
     assert told == ["robot-1: the robot is carried to (4.20, 2.00) and not told"]
+
+
+def test_nobody_is_put_down_right_before_somebody_not_even_when_stepped_by_hand() -> None:
+    """A random place was 0.07 m before a mate that drove on; and stepping by hand put robots into others."""
+    values = two_in_a_room(20.0)
+    values["team"] |= {"starts": [{"x_m": 1.0, "y_m": 3.0}, {"x_m": 3.0, "y_m": 2.0}]}
+    beside = {"robot": 0, "at_s": 0.1, "to": {"x_m": 4.0, "y_m": 2.0}}
+    values["world"] = {**values["world"], "kidnaps": [beside]}
+    sim = Simulation(mission_of(values, seed=2))
+    sim.reset_all()
+    sim.step([Twist(0.0, 0.0), Twist(0.0, 0.0)])
+    assert sim.poses[0].x_m == 1.0
+    for _ in range(100):
+        sim.step([Twist(0.0, 0.0), Twist(-0.5, 0.0)])
+        if sim.poses[0].x_m == 4.0:
+            break
+    assert sim.poses[1].x_m == pytest.approx(2.4, abs=0.1)
+
+
+def test_who_stops_stands_when_stepped_by_hand_as_in_a_run() -> None:
+    values = two_in_a_room(20.0, failures=[{"robot": 1, "at_s": 0.5}])
+    sim = Simulation(mission_of(values, seed=2))
+    sim.reset_all()
+    for _ in range(40):
+        sim.step([Twist(0.1, 0.0)] * 2)
+        if sim.t_s == pytest.approx(1.0):
+            before = sim.poses
+    assert sim.poses[0] != before[0]
+    assert sim.poses[1] == before[1]
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,8 @@ from pilotage.sim.source import Simulator
 
 REACH_M = 1.0
 """A station charges whose middle is this near."""
+ROOM_M = 1.0
+"""Nobody is put down nearer to others: who comes along must be able to stop."""
 
 
 @dataclass(slots=True)
@@ -92,8 +94,7 @@ class Disturbances:
         for kidnap in [kidnap for kidnap in self._kidnaps if now_s >= kidnap.at_s]:
             if self._has_room(kidnap):
                 self._kidnaps.remove(kidnap)
-                who = f"{self._names[kidnap.robot]}: " if len(self._names) > 1 else ""
-                events.append(carry(self._source, kidnap, who))
+                events.append(self._carry(kidnap))
         while self._changes and now_s >= self._changes[0][0]:
             _, broken, failure = self._changes.pop(0)
             events.append(self._change(failure, broken=bool(broken)))
@@ -104,16 +105,16 @@ class Disturbances:
         return events
 
     def _has_room(self, kidnap: Kidnap) -> bool:
-        """Whether nobody stands there: a robot is not put down on another one, but a little later."""
-        bodies, to = self._source.bodies, kidnap.to
-        assert to is not None, "settled by the build"
-        own = bodies[kidnap.robot]
-        return all(
-            math.hypot(body.pose.x_m - to.x_m, body.pose.y_m - to.y_m)
-            > body.footprint.radius_m + own.footprint.radius_m
-            for body in bodies
-            if body is not own
-        )
+        """Whether it may be put down there: not onto somebody nor right before one, but a little later."""
+        return self._source.bodies[kidnap.robot].apart_at_m(_place(kidnap)) > ROOM_M
+
+    def _carry(self, kidnap: Kidnap) -> Event:
+        """Carry a robot elsewhere; nobody tells it."""
+        to = _place(kidnap)
+        self._source.bodies[kidnap.robot].carry_to(to)
+        who = f"{self._names[kidnap.robot]}: " if len(self._names) > 1 else ""
+        text = f"{who}the robot is carried to ({to.x_m:.2f}, {to.y_m:.2f}) and not told"
+        return Event(self._source.t_s, "kidnap", text)
 
     def _change(self, failure: Failure, *, broken: bool) -> Event:
         """A failure begins or is over; several of one kind may overlap."""
@@ -131,13 +132,7 @@ class Disturbances:
         return Event(self._source.t_s, "failure" if broken else "repair", text)
 
 
-def carry(source: Simulator, kidnap: Kidnap, who: str = "") -> Event:
-    """Carry a robot elsewhere; nobody tells it."""
+def _place(kidnap: Kidnap) -> Pose2:
+    """Where to."""
     assert kidnap.to is not None, "settled by the build"
-    to = Pose2(kidnap.to.x_m, kidnap.to.y_m, wrap_to_pi(kidnap.to.theta_rad))
-    source.bodies[kidnap.robot].carry_to(to)
-    return Event(
-        source.t_s,
-        "kidnap",
-        f"{who}the robot is carried to ({to.x_m:.2f}, {to.y_m:.2f}) and not told",
-    )
+    return Pose2(kidnap.to.x_m, kidnap.to.y_m, wrap_to_pi(kidnap.to.theta_rad))

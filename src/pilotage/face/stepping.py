@@ -9,11 +9,10 @@ from pilotage.core import given
 from pilotage.core.errors import InputError
 from pilotage.core.types import STOP, Command, Pose2, Twist, WheelSpeeds
 from pilotage.experiments.build.build import Source, build_source
-from pilotage.experiments.disturbances import carry
+from pilotage.experiments.disturbances import Disturbances
 from pilotage.face.missions import MissionLike, as_mission
 from pilotage.maps.world_map import WorldMap
 from pilotage.missions.mission import Mission
-from pilotage.missions.places import Kidnap
 from pilotage.sensors.readings import Readings
 
 
@@ -34,7 +33,7 @@ class Simulation:
         self._several = bool(mission.robots)
         self._source: Source | None = build_source(mission)
         self._begun = False
-        self._kidnaps: list[Kidnap] = []
+        self._disturbances: Disturbances | None = None
 
     def reset(self, seed: int | None = None) -> Readings:
         """Begin anew: robots at their starts, random streams at theirs; the readings after one step at rest.
@@ -54,7 +53,7 @@ class Simulation:
             self._source = None
         source = self._built()
         self._begun = True
-        self._kidnaps = sorted(source.mission.world.kidnaps, key=lambda kidnap: kidnap.at_s)
+        self._disturbances = Disturbances(source.mission, source.simulator)
         return self._advance([STOP] * len(source.simulator.bodies))
 
     @overload
@@ -126,8 +125,8 @@ class Simulation:
 
     def _advance(self, commands: Sequence[Command]) -> list[Readings]:
         simulator = self._built().simulator
-        while self._kidnaps and simulator.t_s >= self._kidnaps[0].at_s:
-            carry(simulator, self._kidnaps.pop(0))
+        assert self._disturbances is not None, "a reset came first"
+        self._disturbances.due()
         return simulator.step(commands)
 
     def _one(self, readings: list[Readings]) -> Readings:

@@ -145,6 +145,11 @@ class Body:
         x, y, theta = self.state[:3].tolist()
         return float(clearances.contact_bearing(x, y, theta, *self._among_all))
 
+    def apart_at_m(self, pose: Pose2) -> float:
+        """Clearance from all other bodies if it stood elsewhere; inf where there are none."""
+        x, y, theta = pose.x_m, pose.y_m, pose.theta_rad
+        return float(clearances.others_clearance(x, y, theta, self._outline, self._others, self.own))
+
     def distance_to_m(self, other: Body) -> float:
         """Clearance from another robot."""
         traffic, (first, last, disc) = self.world.traffic, other.own.tolist()
