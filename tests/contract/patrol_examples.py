@@ -29,8 +29,6 @@ STRATEGY_NUMBERS: dict[str, frozenset[str]] = {
             "sharing_cost",
             "forecast_mean_weight",
             "forecast_sharing_cost",
-            "jam_late_ratio",
-            "late_ratio",
             "slack",
         }
     ),

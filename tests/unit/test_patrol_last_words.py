@@ -91,7 +91,7 @@ def test_nothing_is_expected_of_who_does_not_say_how_it_talks_or_where_it_is() -
 def test_of_two_the_other_takes_it_all_as_soon_as_silence_is_no_chance(chance: float, *, left: bool) -> None:
     """It waited for 45 s, in which the other may have been out of reach."""
     graph = lattice(5, 4, 3.0)
-    memory, other = (PatrolMemory(20, k, 2, at, 1.0) for k, at in ((0, 0), (1, 19)))
+    memory, other = (PatrolMemory(21, k, 2, at, 1.0) for k, at in ((0, 0), (1, 19)))
     setting = PatrolSetting(graph, 0, np.array([0, 19]), 1.0, np.random.default_rng(0))
     entry = STRATEGIES.entry("adaptive-rounds")
     strategy: Any = entry.factory(entry.config(), setting)
@@ -105,7 +105,7 @@ def test_of_two_the_other_takes_it_all_as_soon_as_silence_is_no_chance(chance: f
 
 def test_false_alarms_of_who_patrols_out_of_reach_get_rarer_and_rarer() -> None:
     """Four places that four robots held, one of them out of reach: it was given up every minute or two."""
-    memory, other = (PatrolMemory(20, k, 2, at, 1.0) for k, at in ((0, 0), (1, 19)))
+    memory, other = (PatrolMemory(21, k, 2, at, 1.0) for k, at in ((0, 0), (1, 19)))
     setting = PatrolSetting(lattice(5, 4, 3.0), 0, np.array([0, 19]), 1.0, np.random.default_rng(0))
     entry = STRATEGIES.entry("adaptive-rounds")
     strategy: Any = entry.factory(entry.config(), setting)

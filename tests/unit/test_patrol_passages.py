@@ -13,6 +13,7 @@ from pilotage.maps.floor import Floor
 from pilotage.stack.patrol.graph import PatrolGraph
 from pilotage.stack.patrol.passages import Passages
 from pilotage.stack.patrol.roadmap import Roadmap
+from pilotage.stack.patrol.shut_paths import OpenGraph, ShutPaths
 from pilotage.stack.patrol.strategies.adaptive_rounds import AdaptiveRoundsConfig, best_plan
 from pilotage.stack.patrol.strategy import PatrolSetting
 from pilotage.stack.patrol.task import PatrolSite
@@ -29,6 +30,23 @@ def test_a_door_has_room_for_one_or_for_two(width_m: float, pieces: int) -> None
         assert there.end_m - there.begin_m < 1.0
         assert (back.begin_m, back.end_m) == pytest.approx((4.0 - there.end_m, 4.0 - there.begin_m))
         assert back.piece == there.piece
+
+
+def test_how_tight_it_is_for_two_is_told_along_each_edge_that_leads_there() -> None:
+    graph, passages = row(with_door(1.0), (2.0, 2.5), (6.0, 2.5))
+    there, back = passages.tight[0, 1], passages.tight[1, 0]
+    np.testing.assert_array_equal(there, back[::-1])
+    assert len(there) == 1 + 4.0 / 0.5
+    assert there.max() == there[len(there) // 2] == 1.0
+    # 2 m from the nearest wall, where two need 0.76 m.
+    assert there[0] == pytest.approx((0.76 / 2.0) ** 2, rel=0.1)
+
+    graph, passages = row(with_corridor(), (2.0, 2.5), (7.0, 2.5), (12.0, 2.5))
+    left = OpenGraph.of(graph, passages, ShutPaths(unreached=(0,))).passages
+    assert set(left.tight) == set(left.stretches) == {(0, 1), (1, 0)}
+    np.testing.assert_array_equal(left.tight[0, 1], passages.tight[1, 2])
+    longer = OpenGraph.of(graph, passages, ShutPaths(detours=((0, 1, 9.0),))).passages
+    assert set(longer.tight) == set(longer.stretches) == {(1, 2), (2, 1)}
 
 
 @pytest.mark.parametrize(

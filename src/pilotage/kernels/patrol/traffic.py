@@ -17,6 +17,8 @@ BEHIND_M = 1.0
 """In a passage nobody comes nearer to the one ahead."""
 CLAIM_M = 4.0
 """From so far before a passage robots are served in the order in which they come."""
+NEAR_M, PARTED_M = 1.5, 3.0
+"""Who is so near to another meets it; and so far, has parted from it."""
 NEVER = np.inf
 
 
@@ -35,6 +37,11 @@ class Walks(NamedTuple):
         (S,) where sections begin along their walks, ascending, and their lengths.
     until
         (S, S) how far through the second one a robot keeps others out of the first; 0 where it never does.
+    places, away
+        (V, 2) where vertices are, between which robots drive straight, and (V, V) paths from each to each.
+    first_tight, tight
+        (K + 1,) where what is told of each leg begins, and from 0 to 1 how tight it is for two who meet, at
+        places evenly along it.
     is_tight
         (V,) whether nobody waits at a vertex for others to catch up.
     """
@@ -48,11 +55,18 @@ class Walks(NamedTuple):
     mouths: FloatArray
     through: FloatArray
     until: FloatArray
+    places: FloatArray
+    away: FloatArray
+    first_tight: IntArray
+    tight: FloatArray
     is_tight: BoolArray
 
 
 class Manner(NamedTuple):
     """How robots drive, all as distances but two ratios.
+
+    Legs take a time that is uniform around what they should. What a meeting takes is the cube of an
+    exponential: most robots pass each other at once, a few stand in each other's way for long.
 
     Attributes
     ----------
@@ -61,9 +75,9 @@ class Manner(NamedTuple):
     visit
         Who is so near to a vertex visits it.
     meeting
-        What waiting before a passage takes longer: braking and starting.
-    late_ratio
-        Legs take longer at random, up to so much.
+        What both who come near each other lose, on average, where two have just room abreast.
+    late
+        Between the slowest and the fastest time of a leg.
     slack_ratio, most_slack_ratio
         A robot waits for others of its walk that are late by more than this share of a mean leg, or of the
         distance between them.
@@ -76,7 +90,7 @@ class Manner(NamedTuple):
     total: float
     visit: float
     meeting: float
-    late_ratio: float
+    late: float
     slack_ratio: float
     most_slack_ratio: float
     waits: bool
@@ -87,7 +101,10 @@ class Team(NamedTuple):
 
     ``behind`` is how far they are into that; ``to_stop`` and ``to_mouth`` are what is left to the next ones;
     ``rest`` is how long they stand yet, ``claimed`` since when they want into their next section, ``waited``
-    for how long they have let others catch up where they stand; ``pace`` is their speed's share.
+    for how long they have let others catch up where they stand; ``pace`` is their speed's share. ``spots``
+    (N, 2) are where they are and ``tight`` how that is for two, ``is_near`` (N, N) tells who met and has not
+    parted yet. ``draws`` (D,) from 0 to 1 are taken one after the other, over and over; ``drawn`` (1,) counts
+    them.
     """
 
     group: IntArray
@@ -102,13 +119,17 @@ class Team(NamedTuple):
     claimed: FloatArray
     waited: FloatArray
     pace: FloatArray
-    is_held: BoolArray
     is_at_stop: BoolArray
+    spots: FloatArray
+    tight: FloatArray
+    is_near: BoolArray
+    draws: FloatArray
+    drawn: IntArray
 
 
 @kernel
 def drive_rounds(
-    walks: Walks, group: IntArray, along: FloatArray, late: FloatArray, manner: Manner
+    walks: Walks, group: IntArray, along: FloatArray, draws: FloatArray, manner: Manner
 ) -> tuple[float, float]:
     """The worst and the mean time since vertices were visited last, as distances.
 
@@ -116,14 +137,13 @@ def drive_rounds(
     ----------
     group, along
         (N,) the walk of each robot, and where along it it begins.
-    late
-        (D,) from 0 to 1: how late legs are, one after the other, over and over.
+    draws
+        (D,) from 0 to 1, below it: by how much legs and waits differ, one after the other, over and over.
     """
     count, vertices = group.shape[0], walks.is_tight.shape[0]
-    team = _begin(walks, group, along)
+    team = _begin(walks, group, along, draws)
     last = np.zeros(vertices)
     judged = np.zeros(2)  # the longest time, and the sum of squares
-    drawn = 0
     for tick in range(int(manner.total / manner.step)):
         now = tick * manner.step
         for robot in range(count):
@@ -152,8 +172,9 @@ def drive_rounds(
                 team.to_stop[robot] += walks.legs[here]
                 team.stop[robot] = here + 1 if here + 1 < end else first
                 team.is_at_stop[robot] = True
-                team.pace[robot] = 1.0 / (1.0 + manner.late_ratio * late[drawn % late.shape[0]])
-                drawn += 1
+                team.pace[robot] = _pace(team, walks.legs[here], manner.late)
+        if manner.meeting > 0.0:
+            _meet(walks, team, manner.meeting)
     for vertex in range(vertices):
         # Who comes next may be near enough already.
         gap = max(0.0, manner.total - last[vertex] - 2.0 * manner.visit)
@@ -162,7 +183,7 @@ def drive_rounds(
 
 
 @kernel
-def _begin(walks: Walks, group: IntArray, along: FloatArray) -> Team:
+def _begin(walks: Walks, group: IntArray, along: FloatArray, draws: FloatArray) -> Team:
     """Robots where they begin, on their way to the next stop and section, in none."""
     count = group.shape[0]
     team = Team(
@@ -179,7 +200,11 @@ def _begin(walks: Walks, group: IntArray, along: FloatArray) -> Team:
         np.zeros(count),
         np.ones(count),
         np.zeros(count, np.bool_),
-        np.zeros(count, np.bool_),
+        np.zeros((count, 2)),
+        np.zeros(count),
+        np.zeros((count, count), np.bool_),
+        draws,
+        np.zeros(1, np.int64),
     )
     for robot in range(count):
         length, at = walks.length[group[robot]], 0.0
@@ -194,6 +219,85 @@ def _begin(walks: Walks, group: IntArray, along: FloatArray) -> Team:
             if ahead < team.to_mouth[robot]:
                 team.section[robot], team.to_mouth[robot] = section, ahead
     return team
+
+
+@kernel
+def _draw(team: Team) -> float:
+    """The next one, from 0 to 1."""
+    team.drawn[0] += 1
+    return float(team.draws[(team.drawn[0] - 1) % team.draws.shape[0]])
+
+
+@kernel
+def _pace(team: Team, leg: float, late: float) -> float:
+    """The share of its speed at which a robot drives a leg, of which half the time is the least."""
+    takes = leg + late * (_draw(team) - 0.5)
+    return leg / max(takes, 0.5 * leg) if leg > 0.0 else 1.0
+
+
+@kernel
+def _meet(walks: Walks, team: Team, meeting: float) -> None:
+    """Delay those who have come near each other, but for who follows the other."""
+    for robot in range(team.group.shape[0]):
+        team.tight[robot] = _place(walks, team, robot)
+        for mate in range(robot):
+            across, along = team.spots[robot] - team.spots[mate]
+            apart = np.hypot(across, along)
+            if team.is_near[robot, mate]:
+                team.is_near[robot, mate] = apart < PARTED_M
+            elif apart < NEAR_M:
+                team.is_near[robot, mate] = True
+                if _path(walks, team, robot, mate) < PARTED_M and not _is_following(walks, team, robot, mate):
+                    tight = max(team.tight[robot], team.tight[mate])
+                    lost = meeting * tight * (-np.log1p(-_draw(team))) ** 3 / 6.0
+                    team.rest[robot] = max(team.rest[robot], 0.0) + lost
+                    team.rest[mate] = max(team.rest[mate], 0.0) + lost
+
+
+@kernel
+def _leg(walks: Walks, team: Team, robot: int) -> tuple[int, float, float]:
+    """The stop that a robot has left, and how far it is from it and to the next one."""
+    group, stop = team.group[robot], team.stop[robot]
+    before = stop - 1 if stop > walks.first_stop[group] else walks.first_stop[group + 1] - 1
+    left = min(max(team.to_stop[robot], 0.0), walks.legs[before])
+    return before, walks.legs[before] - left, left
+
+
+@kernel
+def _place(walks: Walks, team: Team, robot: int) -> float:
+    """How tight it is where a robot is now; note where that is."""
+    before, _, left = _leg(walks, team, robot)
+    share = left / walks.legs[before] if walks.legs[before] > 0.0 else 0.0
+    here, there = walks.places[walks.stops[before]], walks.places[walks.stops[team.stop[robot]]]
+    for axis in range(2):
+        team.spots[robot, axis] = there[axis] + share * (here[axis] - there[axis])
+    first, last = walks.first_tight[before], walks.first_tight[before + 1] - 1
+    return float(walks.tight[first + round((1.0 - share) * (last - first))]) if last >= first else 0.0
+
+
+@kernel
+def _path(walks: Walks, team: Team, robot: int, mate: int) -> float:
+    """The shortest path from one to another: who is on the other side of a wall does not meet it."""
+    before, behind, left = _leg(walks, team, robot)
+    mate_before, mate_behind, mate_left = _leg(walks, team, mate)
+    a, b = walks.stops[before], walks.stops[team.stop[robot]]
+    c, d = walks.stops[mate_before], walks.stops[team.stop[mate]]
+    if a == c and b == d:
+        return float(abs(behind - mate_behind))
+    if a == d and b == c:
+        return float(abs(behind - mate_left))
+    back = behind + min(mate_behind + walks.away[a, c], mate_left + walks.away[a, d])
+    return float(min(back, left + min(mate_behind + walks.away[b, c], mate_left + walks.away[b, d])))
+
+
+@kernel
+def _is_following(walks: Walks, team: Team, robot: int, mate: int) -> bool:
+    """Whether two are near each other along one walk."""
+    group = team.group[robot]
+    if team.group[mate] != group or walks.length[group] <= 0.0:
+        return False
+    ahead = (team.along[mate] - team.along[robot]) % walks.length[group]
+    return bool(min(ahead, walks.length[group] - ahead) < PARTED_M)
 
 
 @kernel
@@ -265,12 +369,9 @@ def _advance(walks: Walks, team: Team, robot: int, now: float, manner: Manner) -
             team.claimed[robot] = min(team.claimed[robot], now)
         if team.to_mouth[robot] <= step:
             if _is_taken(walks, team, robot):
-                team.is_held[robot] = True
                 return False
             team.within[robot], team.behind[robot] = team.section[robot], 0.0
             team.claimed[robot] = NEVER
-            if team.is_held[robot]:
-                team.is_held[robot], team.rest[robot] = False, manner.meeting
     if team.within[robot] != NONE and _is_close(walks, team, robot):
         return False
     team.along[robot] = (team.along[robot] + step) % length

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -40,5 +39,6 @@ def as_driven(
     longer = edges_m > graph.edges_m
     if not longer.any():
         return graph, passages
-    kept = {edge: parts for edge, parts in passages.stretches.items() if not longer[edge]}
-    return PatrolGraph.of(graph.vertices_xy_m, edges_m), replace(passages, stretches=kept)
+    same = {vertex: vertex for vertex in range(len(graph))}
+    left = passages.kept(same, {(a, b) for a, b in np.argwhere(longer).tolist()})
+    return PatrolGraph.of(graph.vertices_xy_m, edges_m), left

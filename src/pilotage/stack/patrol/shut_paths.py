@@ -128,13 +128,8 @@ class OpenGraph:
             edges_m[a, b] = edges_m[b, a] = length_m
             longer |= {(a, b), (b, a)}
         new = {old: k for k, old in enumerate(places.tolist())}
-        kept = {
-            (new[a], new[b]): parts
-            for (a, b), parts in passages.stretches.items()
-            if a in new and b in new and (a, b) not in longer
-        }
         left = PatrolGraph.of(graph.vertices_xy_m[places], edges_m[np.ix_(places, places)])
-        return OpenGraph(left, replace(passages, stretches=kept), places)
+        return OpenGraph(left, passages.kept(new, longer), places)
 
     def whole(self, plan: Plan) -> Plan:
         """A plan of what is left by the numbers of the whole graph."""

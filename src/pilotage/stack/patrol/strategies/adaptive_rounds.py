@@ -34,13 +34,11 @@ class AdaptiveRoundsConfig(Config):
     Rounds are looked for whose worst idleness plus ``mean_weight`` times their mean is little; the worst of
     one that several robots share counts ``sharing_cost`` more there and its mean half of that. Of the plans
     found the one is taken whose forecast is best: its worst plus ``forecast_mean_weight`` times its mean,
-    ``forecast_sharing_cost`` of that more where robots share a round, for what it does not know. In it
-    legs take up to ``late_ratio`` longer at random, who has waited before a passage that has room for one
-    takes ``meeting_m`` of driving longer, and turning back takes ``late_m`` more than data sheets say, for
-    decisions are made a few times a second. Where robots come through such passages against each other, what
-    that costs is added as it is while they are ``jam_late_ratio`` late and waiting takes ``jam_meeting_m``:
-    now and then they stand in each other's way for long. A round on which robots are nearer to each other
-    than ``headway_m``, who watch and avoid each other all the time, is taken only where there is no other.
+    ``forecast_sharing_cost`` of that more where robots share a round, for what it does not know. In it legs
+    take up to half of ``late_m`` more or less, and two who come near each other lose ``meeting_m`` of driving
+    on average where they have just room abreast: most pass at once, now and then they stand in each other's
+    way for long. A round on which robots are nearer to each other than ``headway_m``, who watch and avoid
+    each other all the time, is taken only where there is no other.
 
     A robot waits while it is further ahead of its place among those that share its round than ``slack`` of a
     mean leg between stops, within which nobody knows where the others are, or ``most_slack`` of the time
@@ -52,11 +50,8 @@ class AdaptiveRoundsConfig(Config):
     sharing_cost: NonNegative = 0.06
     forecast_mean_weight: NonNegative = 0.5
     forecast_sharing_cost: NonNegative = 0.03
-    late_ratio: NonNegative = 0.25
-    meeting_m: NonNegative = 2.5
-    jam_late_ratio: NonNegative = 0.5
-    jam_meeting_m: NonNegative = 8.0
-    late_m: NonNegative = 0.4
+    late_m: NonNegative = 0.7
+    meeting_m: NonNegative = 0.5
     headway_m: NonNegative = 6.0
     slack: Positive = 0.5
     most_slack: Positive = Field(default=0.1, le=0.5)
@@ -86,13 +81,11 @@ def best_plan(setting: PatrolSetting, robots: int, config: AdaptiveRoundsConfig)
     ]
     driving = Driving(
         visit_m=setting.visit_m,
-        turn_m=setting.turn_m + config.late_m if setting.turn_m > 0.0 else 0.0,
+        turn_m=setting.turn_m,
         meeting_m=config.meeting_m,
-        late_ratio=config.late_ratio,
+        late_m=config.late_m,
         slack=config.slack,
         most_slack=config.most_slack,
-        jam_late_ratio=config.jam_late_ratio,
-        jam_meeting_m=config.jam_meeting_m,
         beside_m=config.beside_passage_m,
         talks=setting.talks,
     )
