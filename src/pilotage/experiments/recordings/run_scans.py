@@ -54,9 +54,7 @@ def read_run_scans(folder: Path) -> LaserLog:
 
 
 def _odometry(data: RunData) -> tuple[FloatArray, FloatArray | None]:
-    """(M,) times and (M, 3) poses by the odometry alone: at the scans where they are kept with those, which rows
-    of the trace may be rarer than.
-    """
+    """(M,) times and (M, 3) poses by the odometry alone; at the scans, where they are kept with those."""
     at_scans = data.sightings.scan_odometry
     if len(at_scans):
         return at_scans[:, 0], at_scans[:, 1:]
