@@ -20,6 +20,8 @@ from pilotage.stack.knowledge import RobotKnowledge
 PIECES = 4
 TOUCH_M = 0.01
 """What the laser shows nearer than this on the way of a command is touched."""
+MOST_PIECES = 100
+"""A metre, within which a robot that is guarded stops."""
 ORIGIN, NO_WALLS, NOTHING = Pose2(0.0, 0.0, 0.0), np.empty((0, 4)), np.empty((0, 2))
 
 
@@ -128,8 +130,8 @@ class ScanGuard:
         circles_m = np.column_stack([ends_m, np.zeros(len(ends_m))])
         corners, radius_m = self._footprint.points_m, self._footprint.radius_m
         # So finely that no corner skips over what is touched.
-        swept_m = (speed_m_s + abs(command.w_rad_s) * radius_m) * until_s
-        poses = _along(command, ORIGIN, until_s, math.ceil(swept_m / TOUCH_M))
+        swept_m = (speed_m_s + abs(command.w_rad_s) * radius_m) * until_s + TOUCH_M
+        poses = _along(command, ORIGIN, until_s, min(math.ceil(swept_m / TOUCH_M), MOST_PIECES))
         now_m = least_along(poses[:1], corners, radius_m, NO_WALLS, circles_m)
         then_m = least_along(poses[1:], corners, radius_m, NO_WALLS, circles_m)
         return ends_m if then_m < min(self._margin_m, now_m) else NOTHING
