@@ -1,19 +1,43 @@
-"""Writes ``docs/api``: one page a public name, from its signature and its docstring."""
+"""Writes ``docs/api``: a page a public name, one of all roles, from signatures and docstrings."""
 
 from __future__ import annotations
 
+import dataclasses
 import inspect
 import re
 import sys
 from collections.abc import Callable
+from enum import Enum
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args, get_type_hints
 
 import pilotage
+from pilotage.evaluation.tasks.task import TaskSetting
+from pilotage.experiments.roles import ROLES
+from pilotage.maps.world_map import WorldMap
+from pilotage.sim.bodies.motion import SIMULATED_MOTIONS
+from pilotage.sim.faults.fault import FaultSetting
+from pilotage.sim.people.people import PeopleSetting
+from pilotage.sim.sensing.sensor import SIMULATED_SENSORS, Carrier
+from pilotage.stack.journal import Journal
+from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
+from pilotage.stack.navigator.navigator import Parts
+from pilotage.stack.patrol.strategy import PatrolSetting
+from pilotage.stack.planning.grid_planner import GRID_PLANNERS
 
 FOLDER = Path(__file__).parent / "api"
 SECTIONS = ("Parameters", "Attributes", "Returns", "Raises", "Notes", "Examples")
 MODULES = ("filters", "lines", "planners")
+SIMULATED = {
+    "simulated motion": SIMULATED_MOTIONS,
+    "simulated sensor": SIMULATED_SENSORS,
+    "planner over cells": GRID_PLANNERS,
+}
+TOLD = (
+    *(RobotKnowledge, TaskKnowledge, WorldMap, Parts, Journal, Carrier),
+    *(TaskSetting, FaultSetting, PeopleSetting, PatrolSetting),
+)
+"""What components are built with."""
 
 
 def pages() -> dict[str, str]:
@@ -22,7 +46,7 @@ def pages() -> dict[str, str]:
     for name in pilotage.__all__:
         found = getattr(pilotage, name)
         out[page_of(name)] = _module(name, found) if inspect.ismodule(found) else _entry(f"pl.{name}", found)
-    return {"README.md": _index(), **out}
+    return {"README.md": _index(), "roles.md": _roles(), **out}
 
 
 def page_of(name: str) -> str:
@@ -51,6 +75,59 @@ def _summary(found: object) -> str:
     return " ".join(text.split("\n\n", 1)[0].split()).replace("``", "`").replace("|", "\\|")
 
 
+def _roles() -> str:
+    """Every role's protocol, and the values that its methods take and give."""
+    parts = [
+        "# The roles",
+        "",
+        "What a class that is registered for a role has to have: attributes and methods, what these take and",
+        "give, and the values that are handed over. Names carry the unit. Written by `make api` from the",
+        "protocols; [CONTRIBUTING](../../CONTRIBUTING.md) shows how a component is added. Of a motion and a",
+        "sensor the data sheet is registered, and a class that simulates it for that.",
+    ]
+    values: dict[type, None] = dict.fromkeys(TOLD)
+    registries: dict[str, Any] = ROLES | SIMULATED
+    for role, registry in registries.items():
+        name, protocol = _protocol_of(registry)
+        kind = protocol.__name__
+        parts += ["", f"## {role}", "", f"`{name}` of `{_place(protocol)}`, a `{kind}`.", ""]
+        parts.append(_entry(kind, protocol, level=2, typed=True).partition("\n\n")[2])
+        looked = [f"`{gives.method}`: {gives.expected}" for gives in registry.gives]
+        if looked:
+            parts += ["", "What is looked at: " + "; ".join(looked).replace("`__init__`", "once built") + "."]
+        values |= dict.fromkeys(found for _, member in _members(protocol) for found in _own_types(member))
+    parts += ["", "## What is handed over", ""]
+    for value in sorted(values, key=lambda value: value.__name__):
+        parts += [_entry(value.__name__, value, level=3, typed=True), f"In `{_place(value)}`.", ""]
+    return re.sub(r"\n{3,}", "\n\n", "\n".join(parts))
+
+
+def _protocol_of(registry: Any) -> tuple[str, type]:
+    """A registry's name, and what its entries are."""
+    for module in [module for key, module in sys.modules.items() if key.startswith("pilotage.")]:
+        for name in vars(module).get("__annotations__", ()):
+            if getattr(module, name, None) is registry:
+                (protocol,) = get_args(get_type_hints(module)[name])
+                return name, (get_args(protocol) or (protocol,))[0]
+    raise LookupError(registry.role)
+
+
+def _place(found: type) -> str:
+    return found.__module__.removeprefix("pilotage.").replace(".", "/") + ".py"
+
+
+def _own_types(member: Any) -> set[type]:
+    """The dataclasses and enumerations of ours that a method or a property takes and gives."""
+    found: set[type] = set()
+    hints = list(get_type_hints(getattr(member, "fget", member)).values())
+    while hints:
+        hint = hints.pop()
+        hints += get_args(hint)
+        if inspect.isclass(hint) and hint.__module__.startswith("pilotage"):
+            found.add(hint)
+    return found
+
+
 def _module(name: str, module: Any) -> str:
     parts = [f"# `pl.{name}`", "", _prose(inspect.getdoc(module) or "")]
     for inner in module.__all__:
@@ -58,19 +135,30 @@ def _module(name: str, module: Any) -> str:
     return "\n".join(parts).rstrip() + "\n"
 
 
-def _entry(name: str, found: Any, level: int = 1) -> str:
+def _entry(name: str, found: Any, level: int = 1, *, typed: bool = False) -> str:
     parts = [f"{'#' * level} `{name}`", ""]
     config = inspect.isclass(found) and hasattr(found, "model_fields")
-    if not config:
-        parts += ["```python", f"{name}{_signature(found)}", "```", ""]
+    if not (config or getattr(found, "_is_protocol", False) or _is_enum(found)):
+        parts += ["```python", f"{name}{_signature(found, typed=typed)}", "```", ""]
     parts.append(_prose(_doc(found)))
-    if config:
+    if _is_enum(found):
+        parts += ["", *(f"- `{member.name}`" for member in found)]
+    elif typed and not dataclasses.is_dataclass(found):
+        attributes = getattr(found, "__annotations__", {}).items()
+        parts += ["", *(f"- `{key}: {kind}`" for key, kind in attributes if not key.startswith("_"))]
+    elif config:
         parts += ["", *(f"- `{key}`" for key in found.model_fields)]
-    elif inspect.isclass(found) and not issubclass(found, BaseException):
+    if inspect.isclass(found) and not config and not issubclass(found, BaseException):
         for key, member in _members(found):
-            shown = f"{key}{_signature(member, bound=True)}" if callable(member) else key
+            shown = f"{key}{_signature(member, bound=True, typed=typed)}" if callable(member) else key
+            if typed and isinstance(member, property):
+                shown += f": {member.fget.__annotations__['return']}"
             parts += ["", f"{'#' * (level + 1)} `{shown}`", "", _prose(_doc(member))]
     return "\n".join(parts).rstrip() + "\n"
+
+
+def _is_enum(found: object) -> bool:
+    return inspect.isclass(found) and issubclass(found, Enum)
 
 
 def _doc(found: Any) -> str:
@@ -92,7 +180,7 @@ def _members(found: type) -> list[tuple[str, Any]]:
     for base in reversed(found.__mro__):
         if not base.__module__.startswith("pilotage"):
             continue
-        for key, member in vars(base).items():
+        for key, member in list(vars(base).items()):
             raw = member.fget if isinstance(member, property) else getattr(member, "func", member)
             raw = getattr(raw, "__func__", raw)
             if not key.startswith("_") and inspect.isfunction(raw) and raw.__doc__:
@@ -100,19 +188,34 @@ def _members(found: type) -> list[tuple[str, Any]]:
     return list(out.items())
 
 
-def _signature(found: Callable[..., Any], *, bound: bool = False) -> str:
-    """Parameters as they are called, without types: these are told in words."""
+def _signature(found: Callable[..., Any], *, bound: bool = False, typed: bool = False) -> str:
+    """Parameters as they are called; without types these are told in words."""
     try:
         signature = inspect.signature(found)
     except ValueError:
         return "(...)"
+    kinds = {
+        name: _Word(each.annotation) if typed else each.empty for name, each in signature.parameters.items()
+    }
     parameters = [
-        parameter.replace(annotation=inspect.Parameter.empty)
+        parameter.replace(
+            annotation=parameter.empty if parameter.annotation is parameter.empty else kinds[name]
+        )
         for name, parameter in signature.parameters.items()
         if not (bound and name == "self")
     ]
-    text = str(inspect.Signature(parameters))
+    gives: Any = signature.empty
+    if typed and not inspect.isclass(found):
+        gives = _Word(signature.return_annotation)
+    text = str(inspect.Signature(parameters, return_annotation=gives))
     return re.sub(r"<(factory|object|function)[^>]*>", "...", text)
+
+
+class _Word(str):
+    """An annotation as it is written, without quotes."""
+
+    __slots__ = ()
+    __repr__ = str.__str__
 
 
 def _prose(text: str) -> str:

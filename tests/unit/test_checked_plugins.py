@@ -141,7 +141,7 @@ CALLED_WITH: dict[str, tuple[object, ...]] = {
 def made(role: str, gives: object, **members: object) -> Any:
     """A stranger's component of a role whose method gives this."""
     registry, method = GIVES[role]
-    roles = registry._gives
+    roles = registry.gives
     methods: dict[str, object] = {
         each.method: lambda *_: gives for each in roles if each.method != "__init__" and not each.optional
     }
@@ -393,7 +393,7 @@ class TakesNothing:
 def test_one_that_cannot_be_built_as_its_role_says_is_refused(base: type, found: str) -> None:
     """It was a TypeError of ours."""
     members = {"__module__": "somebodys", "step": lambda *_: None}
-    cls = checked(type("Mine", (base,), members), "controller 'mine'", *CONTROLLERS._gives)
+    cls = checked(type("Mine", (base,), members), "controller 'mine'", *CONTROLLERS.gives)
     told = f"^controller 'mine' of 'somebodys': expected to be built from 2 arguments .*{re.escape(found)}"
     with pytest.raises(InputError, match=told):
         cls(1, 2)
@@ -409,7 +409,7 @@ def test_a_planner_is_looked_at_over_cells_as_well() -> None:
 
 def test_one_without_a_constructor_is_built_from_nothing() -> None:
     members = {"__module__": "somebodys", "step": lambda *_: None}
-    cls = checked(type("Mine", (TakesNothing,), members), "controller 'mine'", *CONTROLLERS._gives)
+    cls = checked(type("Mine", (TakesNothing,), members), "controller 'mine'", *CONTROLLERS.gives)
     assert cls()
     with pytest.raises(InputError, match="expected to be built from 2 arguments"):
         cls(1, 2)
@@ -422,7 +422,7 @@ def test_a_navigator_that_says_how_far_it_is_drives() -> None:
 def test_one_without_its_roles_method_is_refused_as_it_registers() -> None:
     cls = type("Mine", (), {"__module__": "somebodys"})
     with pytest.raises(InputError, match="expected a class with a method 'plan', found none"):
-        checked(cls, "planner 'mine'", *PLANNERS._gives)
+        checked(cls, "planner 'mine'", *PLANNERS.gives)
 
 
 def test_our_own_are_left_as_they_are() -> None:

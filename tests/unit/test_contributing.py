@@ -81,6 +81,7 @@ def test_the_examples_run_from_outside(tmp_path: Path) -> None:
 def test_the_table_of_roles_is_true() -> None:
     """Every role but those of the worked examples, what it is built as and what its protocol has."""
     row = r"^\| `(\w+)`.* \| `(\w+)` of `(\S+)\.py` \| `(.*?)` \| (.*) \|$"
+    reference = (ROOT / "docs/api/roles.md").read_text()
     rows = {key.removesuffix("s"): rest for key, *rest in re.findall(row, TEXT, re.MULTILINE)}
     assert set(rows) == set(ROLES) - {"planner", "sensor", "motion", "task"}
     for role, (registry, file, built, has) in rows.items():
@@ -91,6 +92,8 @@ def test_the_table_of_roles_is_true() -> None:
         (protocol,) = get_args(get_type_hints(module)[registry])
         public = {name for name in vars(protocol) | get_type_hints(protocol) if not name.startswith("_")}
         assert set(re.findall(r"`(\w+)`", has)) - {"StackStatus"} == public, role
+        (told,) = re.findall(rf"^## {role}$(.*?)^## ", reference, re.MULTILINE | re.DOTALL)
+        assert set(re.findall(r"^#* ?[-#] `(\w+)(?:\(|: )", told, re.MULTILINE)) == public, role
 
 
 @pytest.mark.parametrize("word", ["stroll", "beeline"])

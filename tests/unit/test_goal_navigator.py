@@ -16,10 +16,14 @@ from pilotage.core.types import STOP, Goal, Pose2, Twist
 from pilotage.experiments.mission import mission_of
 from pilotage.experiments.run import run_mission
 from pilotage.kernels.geometry import chain
+from pilotage.kernels.scans.rays import fan_ranges
 from pilotage.maps.segment_map import SegmentMap
-from pilotage.sensors.readings import Readings
+from pilotage.models.footprint import Footprint
+from pilotage.sensors.lidar import LidarConfig
+from pilotage.sensors.readings import LidarScan, Readings
 from pilotage.sim.source import Simulator
 from pilotage.sim.worlds.world import World
+from pilotage.stack.control.guard import ScanGuard
 from pilotage.stack.control.pi_follower import PiFollower, PiFollowerConfig
 from pilotage.stack.interface import Belief, BeliefStatus, StackStatus
 from pilotage.stack.localization.ekf_landmarks import EkfLandmarkLocalizer
@@ -34,8 +38,9 @@ from pilotage.stack.planning.planner import PLANNERS
 from pilotage.stack.planning.rrt_star_dubins import RrtStarDubinsConfig, RrtStarDubinsPlanner
 from support.missions import reach
 from support.robots import ROOM, Told, sensors, told_of
-from support.worlds import ROOM_MAP, alone, robot, walled
+from support.worlds import DISC, ROOM_MAP, Alone, alone, robot, walled
 
+WALL_AHEAD, NONE = np.array([[0.37, -3.0, 0.37, 3.0]]), np.zeros((0, 3))
 START = Pose2(2.0, 2.0, 0.0)
 
 
@@ -307,3 +312,64 @@ def test_a_car_backs_out_where_new_plans_do_not_help(
     backs = run_mission(mission_of(values, seed=seed), save=False)
     assert backs.success, backs.metrics["reason"]
     assert backs.metrics["collisions"] == 0
+
+
+class Displaced:
+    """A localizer that is off to the left by so much, and does not know it."""
+
+    def __init__(self, sim: Alone, off_m: float) -> None:
+        self._sim, self._off_m = sim, off_m
+
+    @property
+    def belief(self) -> Belief:
+        truth = self._sim.truth
+        return Belief(Pose2(truth.x_m, truth.y_m + self._off_m, truth.theta_rad), 1e-4 * np.eye(3))
+
+    def step(self, readings: Readings) -> Belief:  # noqa: ARG002
+        return self.belief
+
+
+@pytest.mark.parametrize(
+    "outline", [DISC, Footprint.polygon(np.array([[0.25, 0.2], [-0.2, 0.2], [0, -0.25]]))]
+)
+@pytest.mark.parametrize("off_m", [-0.35, 0.25, 0.35])
+def test_who_is_not_where_it_believes_drives_into_nothing_that_its_laser_shows(
+    off_m: float, outline: Footprint
+) -> None:
+    """By its map there was room beside the door's posts: it drove into them."""
+    segments_m = ROOM.segments_m.copy()
+    segments_m[4:] = [[5, 0, 5, 3.5], [5, 4.7, 5, 8]]
+    told = told_of(SegmentMap.of(segments_m), start=START)
+    sim = alone(robot(sensors(), start=START, footprint=outline, seed=0), told.chart)
+    told = replace(told, robot=replace(told.robot, footprint=outline))
+    stack = navigator(told, Displaced(sim, off_m), MapsNothing())
+    command = STOP
+    for _ in range(600):
+        command = stack.step(sim.step(command))
+        if stack.status[0] is not StackStatus.RUNNING:
+            break
+    assert sim.body.collisions == 0
+    status, why = stack.status
+    assert status is StackStatus.ARRIVED or "the stack has no escape" in why
+    assert not outline.is_disc or math.hypot(sim.truth.x_m - 8.0, sim.truth.y_m + off_m - 6.0) < 0.3
+
+
+def test_a_command_is_looked_at_by_what_the_laser_shows_as_far_as_it_takes_to_stop() -> None:
+    told = told_of()
+    guard = ScanGuard(told.robot)
+    scan = LidarScan(
+        fan_ranges(0.0, 0.0, -0.75 * math.pi, LidarConfig().beam_step_rad, 539, 20.0, WALL_AHEAD, NONE)
+    )
+    seen = Readings(0.1, {"lidar": scan})
+    assert len(guard.touched_m(Twist(0.5, 0.0), seen)) > 0
+    # Slowly there is room to stop; away, along, on the spot and without a scan as well.
+    for command in (Twist(0.1, 0.0), Twist(-0.5, 0.0), Twist(0.0, 1.0), STOP):
+        assert len(guard.touched_m(command, seen)) == 0
+    assert len(guard.touched_m(Twist(0.5, 0.0), Readings(0.1, {}))) == 0
+    # Corners swing where a disc does not.
+    corners_m = np.array([[0.35, 0.2], [-0.1, 0.2], [-0.1, -0.2], [0.35, -0.2]])
+    angular = ScanGuard(replace(told.robot, footprint=Footprint.polygon(corners_m)))
+    assert len(angular.touched_m(Twist(0.0, -1.5), seen)) > 0
+    assert len(angular.touched_m(Twist(-0.3, 0.0), seen)) == 0
+    blind = replace(told.robot, sensors={})
+    assert len(ScanGuard(blind).touched_m(Twist(0.5, 0.0), seen)) == 0

@@ -429,3 +429,13 @@ def test_bad_views_are_refused_in_one_line() -> None:
         controller.step(view)
     with pytest.raises(InputError, match="did you mean 'gap-horizon'"):
         LOCAL_CONTROLLERS.entry("gap-horizn")
+
+
+@pytest.mark.parametrize("name", ["dwa", "vfh", "teb", "mppi", "pure-pursuit", "gap-horizon"])
+@pytest.mark.parametrize("speed_m_s", [0.7, 0.8, 0.9])
+def test_each_arrives_with_rates_that_change_at_once(name: str, speed_m_s: float) -> None:
+    """Beside its goal the window's one turned round and round: from there any direction leads down."""
+    quick = LocalLimits(speed_m_s, 0.5, 10.0 * speed_m_s, 10.0 * speed_m_s, 2.3, 23.0)
+    arrived, _, commands = drive(make(name), POSTS[3:], quick, tolerance_m=0.15)
+    assert arrived
+    assert len(commands) < 1.5 * 6.0 / speed_m_s / 0.05

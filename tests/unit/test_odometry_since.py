@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shutil
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,9 @@ from pilotage.experiments.odometry_since import OdometrySince
 from pilotage.experiments.recordings.run_scans import read_run_scans
 from pilotage.experiments.run import run_mission
 from pilotage.logs.run_trace import read_run_odometry
+from pilotage.records.arrays import write_arrays
 from pilotage.records.reckoning import reckoned
+from pilotage.records.scans import SCANS_FILE
 from pilotage.sensors.readings import OdometryIncrement
 from support import missions
 
@@ -64,8 +67,31 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     return ran(0.0), ran(0.35)
 
 
-def test_a_thinned_run_is_read_with_the_whole_odometry(folders: tuple[Path, Path]) -> None:
+def test_a_thinned_run_is_read_with_the_odometry_at_each_scan(
+    folders: tuple[Path, Path],
+) -> None:
+    """It had that at its rows alone: once a second, where the scans are five."""
     every, some = (read_run_scans(folder) for folder in folders)
+    at_every, at_some = every.odometry_at_scans(), some.odometry_at_scans()
+    assert at_every is not None
+    assert at_some is not None
+    assert np.array_equal(at_some, at_every)
+    assert np.array_equal(some.t_s, every.t_s)
+    assert at_some[-1, 2] > 1.0
+
+
+def test_a_thinned_run_without_it_is_read_with_the_whole_odometry(
+    folders: tuple[Path, Path], tmp_path: Path
+) -> None:
+    """Folders of versions that did not keep it: at their rows, where every step's is the same."""
+    logs = []
+    for folder in folders:
+        old = Path(shutil.copytree(folder, tmp_path / folder.name))
+        arrays = dict(np.load(old / SCANS_FILE))
+        arrays.pop("scan_odometry")
+        write_arrays(old / SCANS_FILE, arrays)
+        logs.append(read_run_scans(old))
+    every, some = logs
     assert some.odometry is not None
     assert some.odometry_t_s is not None
     assert every.odometry is not None
@@ -74,6 +100,7 @@ def test_a_thinned_run_is_read_with_the_whole_odometry(folders: tuple[Path, Path
     same = np.searchsorted(every.odometry_t_s, some.odometry_t_s - 1e-9)
     assert some.odometry == pytest.approx(every.odometry[same], abs=1e-9)
     assert some.odometry[-1, 2] > 1.0
+    assert every.odometry_at_scans() == pytest.approx(read_run_scans(folders[0]).odometry_at_scans())
 
 
 def test_a_calibration_reads_it_so_as_well(folders: tuple[Path, Path]) -> None:

@@ -102,7 +102,10 @@ def some_sightings() -> Sightings:
     ranges = np.where(levels % 3 == 0, np.nan, levels * (12.0 / 65534))
     t_s, angles = np.array([0.1, 0.3, 0.5]), np.linspace(-1.0, 1.0, 4)
     poses, mount = np.array([[0.0, 1.0, 0.5], [2.0, 1.5, 3.0], [np.nan] * 3]), np.array([0.1, 0.0, 0.2])
-    return Sightings(t_s, ranges, poses, angles, mount, np.array([1, 0, 2]), np.array([7, 9, 7]), 12.0)
+    driven = np.column_stack([t_s - 0.05, RNG.random((3, 3))])
+    return Sightings(
+        t_s, ranges, poses, driven, angles, mount, np.array([1, 0, 2]), np.array([7, 9, 7]), 12.0
+    )
 
 
 def an_update() -> KeptUpdate:

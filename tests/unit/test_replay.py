@@ -25,7 +25,8 @@ from pilotage.report.replay.scene import PoseTrack, Raster, ReplayScene, ScanTra
 from pilotage.report.replay.section import replay_section
 from pilotage.sensors.beacon import BeaconConfig
 from pilotage.sensors.lidar import LidarConfig
-from pilotage.sensors.readings import BeaconReadings, LidarScan, Readings
+from pilotage.sensors.readings import BeaconReadings, LidarScan, OdometryIncrement, Readings
+from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 from support.browser import Browser
 from support.fabricated_run import fabricate_run
 
@@ -76,13 +77,16 @@ def test_sightings_come_back_as_they_were_seen(tmp_path: Path) -> None:
 
 
 def test_sightings_do_not_grow_without_end() -> None:
-    sightings = Sightings({"lidar": LidarConfig(beams=2)})
+    sightings = Sightings({"lidar": LidarConfig(beams=2), "odometry": WheelOdometryConfig()})
     for step in range(4 * MOST_SCANS):
-        sightings.record(Readings(0.5 * step, {"lidar": LidarScan(np.ones(2))}), Pose2(0.5 * step, 0.0, 0.0))
+        driven = OdometryIncrement(0.5 if step else 0.0, 0.0)
+        readings = Readings(0.5 * step, {"lidar": LidarScan(np.ones(2)), "odometry": driven})
+        sightings.record(readings, Pose2(0.5 * step, 0.0, 0.0))
     arrays = sightings.arrays()
     times = arrays["scan_t_s"]
     assert MOST_SCANS / 2 < len(times) <= MOST_SCANS
     np.testing.assert_array_equal(arrays["scan_poses"][:, 0], times)
+    np.testing.assert_array_equal(arrays["scan_odometry"][:, :2], np.column_stack([times, times]))
     assert times[-1] > 0.5 * 4 * MOST_SCANS - 10.0
 
 

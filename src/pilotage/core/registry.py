@@ -48,7 +48,7 @@ class Registry(Generic[T]):
     """
 
     def __init__(self, role: str, *packages: str, gives: tuple[Gives, ...] = ()) -> None:
-        self.role, self._gives = role, gives
+        self.role, self.gives = role, gives
         self._packages = packages
         self._entries: dict[str, Entry[T]] = {}
         self._loaded = False
@@ -66,7 +66,7 @@ class Registry(Generic[T]):
                 raise InputError(
                     f"{self.role} '{name}': expected a new name, found it registered already by {whose}"
                 )
-            self._entries[name] = Entry(name, checked(cls, f"{self.role} '{name}'", *self._gives), config)
+            self._entries[name] = Entry(name, checked(cls, f"{self.role} '{name}'", *self.gives), config)
             return cls
 
         return register

@@ -35,6 +35,11 @@ class OdometrySince:
         self._y += s * ahead + c * left
         self._theta += reading.angle_rad
 
+    @property
+    def pose(self) -> tuple[float, float, float]:
+        """Where the joined increments lead from the origin."""
+        return self._x, self._y, self._theta
+
     def take(self) -> tuple[float, float, float]:
         """Distance, turn and shift to the left since this was asked last; nan without a reading."""
         if self._last is None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +38,9 @@ class Sightings:
     scan_poses
         (S, 3) where the robot was then: truly, or where nobody knows that, as it believed; nan in folders of
         versions that did not keep it.
+    scan_odometry
+        (S, 4) time of the odometry's last reading then, and the pose that its readings alone lead to from the
+        origin; (0, 4) without odometry, and in folders of versions that did not keep it.
     angles_rad, mount
         (B,) directions of the beams in the scanner's frame; (3,) pose of the scanner on the robot.
     beacon_counts, beacon_ids
@@ -50,6 +53,7 @@ class Sightings:
     scan_t_s: FloatArray = field(default_factory=_empty)
     ranges_m: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
     scan_poses: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
+    scan_odometry: FloatArray = field(default_factory=lambda: np.empty((0, 4)))
     angles_rad: FloatArray = field(default_factory=_empty)
     mount: FloatArray = field(default_factory=lambda: np.zeros(3))
     beacon_counts: IntArray = field(default_factory=_no_ids)
@@ -73,6 +77,8 @@ def sighting_arrays(sightings: Sightings) -> Mapping[str, Any]:
             "scan_angles_rad": sightings.angles_rad,
             "scan_mount": sightings.mount,
         }
+    if len(sightings.scan_odometry):
+        arrays |= {"scan_odometry": sightings.scan_odometry}
     if len(sightings.beacon_counts):
         arrays |= {
             "beacon_counts": sightings.beacon_counts.astype(np.uint16),
@@ -94,29 +100,40 @@ def read_sightings(folder: Path) -> Sightings:
 
 
 def _sightings(arrays: Arrays) -> Sightings:
-    max_range_m = arrays.scalar("scan_resolution_m", np.nan) * LEVELS
-    return Sightings(*_scans(arrays), *_beacons(arrays), max_range_m)
+    counts, ids = _beacons(arrays)
+    return replace(_scans(arrays), beacon_counts=counts, beacon_ids=ids)
 
 
-def _scans(arrays: Arrays) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-    empty = Sightings()
+def _scans(arrays: Arrays) -> Sightings:
     if "scan_t_s" not in arrays:
-        return empty.scan_t_s, empty.ranges_m, empty.scan_poses, empty.angles_rad, empty.mount
+        return Sightings()
     t_s, angles_rad = arrays.floats("scan_t_s", -1), arrays.floats("scan_angles_rad", -1)
     levels = arrays.ints("scan_ranges", len(t_s), len(angles_rad))
-    poses = np.full((len(t_s), 3), np.nan)
+    poses, odometry = np.full((len(t_s), 3), np.nan), np.empty((0, 4))
     if "scan_poses" in arrays:
         poses = arrays.floats("scan_poses", len(t_s), 3)
+    if "scan_odometry" in arrays:
+        odometry = arrays.floats("scan_odometry", len(t_s), 4)
     mount, resolution_m = arrays.floats("scan_mount", 3), arrays.scalar("scan_resolution_m")
-    if not (np.isfinite(t_s).all() and (np.diff(t_s) >= 0.0).all()):
+    if not all(np.isfinite(at).all() and (np.diff(at) >= 0.0).all() for at in (t_s, odometry[:, 0])):
         raise ValueError("expected scans in the order of time")
     if not (np.abs(mount) <= FARTHEST_M).all() or not np.isfinite(angles_rad).all():
         raise ValueError("scan_mount, scan_angles_rad: expected finite numbers")
     if not (np.isnan(poses) | (np.abs(poses) <= FARTHEST_M)).all():
         raise ValueError(f"scan_poses: expected numbers within {FARTHEST_M:g}")
+    if not (np.abs(odometry[:, 1:]) <= FARTHEST_M).all():
+        raise ValueError(f"scan_odometry: expected numbers within {FARTHEST_M:g}")
     if not 0.0 < resolution_m * LEVELS <= FARTHEST_M or bool(((levels < 0) | (levels > NOTHING)).any()):
         raise ValueError(f"scan_ranges: expected numbers from 0 to {NOTHING} in steps of more than 0 m")
-    return t_s, np.where(levels == NOTHING, np.nan, levels * resolution_m), poses, angles_rad, mount
+    return Sightings(
+        scan_t_s=t_s,
+        ranges_m=np.where(levels == NOTHING, np.nan, levels * resolution_m),
+        scan_poses=poses,
+        scan_odometry=odometry,
+        angles_rad=angles_rad,
+        mount=mount,
+        max_range_m=resolution_m * LEVELS,
+    )
 
 
 def _beacons(arrays: Arrays) -> tuple[IntArray, IntArray]:

@@ -28,7 +28,7 @@ class ByConfig(Generic[T]):
     """
 
     def __init__(self, role: str, package: str, *gives: Gives) -> None:
-        self.role, self._gives = role, gives
+        self.role, self.gives = role, gives
         self._package = package
         self._entries: dict[type[Config], Callable[..., T]] = {}
         self._loaded = False
@@ -40,7 +40,7 @@ class ByConfig(Generic[T]):
             if config in self._entries:
                 raise ValueError(f"{self.role} {config.__name__} is simulated twice")
             # Those that are read together have no method of their own.
-            gives = () if hasattr(cls, "together") else self._gives
+            gives = () if hasattr(cls, "together") else self.gives
             self._entries[config] = checked(cls, f"{self.role} {config.__name__}", *gives)
             return cls
 

@@ -31,7 +31,8 @@ class FloorExploration(WatchedTask):
     WANTS: ClassVar[frozenset[str]] = frozenset({"grid"})
 
     def __init__(self, least_mapped: float, return_m: float, spare_m: float, setting: TaskSetting) -> None:
-        if setting.chart.open_ground or setting.chart.walls.segments_m.shape[0] == 0:
+        walls = setting.chart.walls
+        if setting.chart.open_ground or not (len(walls.segments_m) or len(walls.circles_m)):
             raise InputError(
                 "task 'explore': expected a sheet with cells or a floor with walls as world.map, "
                 f"found '{setting.chart.name}'"

@@ -141,6 +141,8 @@ def follow(
             rows.append([readings.t_s, x, y, heading, *pose.as_array(), *upper, *told])
             localized.append(listener.belief.status is BeliefStatus.LOCALIZED)
             seen.record(readings, Pose2(x, y, theta) if math.isfinite(x + y + theta) else pose)
+        else:
+            seen.pass_over(readings)
         if steps is not None and k >= steps:
             break
     columns = (*TRUTH_COLUMNS, *BELIEF_COLUMNS, *names)

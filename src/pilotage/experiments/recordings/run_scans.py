@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from pilotage.core.errors import InputError
-from pilotage.core.types import Pose2
+from pilotage.core.types import FloatArray, Pose2
 from pilotage.logs.laser_log import LaserLog
 from pilotage.records.reckoning import odometry_increments, reckoned
-from pilotage.records.run_data import read_run
+from pilotage.records.run_data import RunData, read_run
 
 EVEN_RAD = 1e-6
 """How far a beam may lie from its place among equal angles."""
@@ -32,7 +32,7 @@ def read_run_scans(folder: Path) -> LaserLog:
     steps = np.diff(seen.angles_rad)
     if beams < 2 or not steps[0] > 0.0 or np.abs(steps - steps.mean()).max() > EVEN_RAD:
         raise InputError(f"{folder}: expected two or more beams at equal angles, found others")
-    increments, t_s = odometry_increments(data.trace), data.trace.t_s
+    t_s, poses = _odometry(data)
     last = np.append(np.diff(t_s) > 0.0, True)
     said = [f"of {len(data.robots)} robots the scans of '{name}' are taken" for name in data.robots[:1]]
     return LaserLog(
@@ -47,7 +47,16 @@ def read_run_scans(folder: Path) -> LaserLog:
         range_max_m=float(seen.max_range_m),
         mount=Pose2.from_array(seen.mount),
         upside_down=False,
-        odometry_t_s=None if increments is None else t_s[last],
-        odometry=None if increments is None else reckoned(increments)[last],
+        odometry_t_s=None if poses is None else t_s[last],
+        odometry=None if poses is None else poses[last],
         warnings=tuple(said),
     )
+
+
+def _odometry(data: RunData) -> tuple[FloatArray, FloatArray | None]:
+    """(M,) times and (M, 3) poses by the odometry alone; at the scans, where they are kept with those."""
+    at_scans = data.sightings.scan_odometry
+    if len(at_scans):
+        return at_scans[:, 0], at_scans[:, 1:]
+    increments = odometry_increments(data.trace)
+    return data.trace.t_s, None if increments is None else reckoned(increments)

@@ -127,9 +127,12 @@ def choose_in_window(
             if free < 1.0 and (stop > free * abs(length) or turn_stop > free * abs(angle) + 1e-9):
                 continue
             lack = (soft - least) / soft
-            cost = togo_at(x, y, togo, x0, y0, coarse) + near_cost * lack * lack
-            down, _ = way_down(x, y, ground)
-            cost += heading_cost * abs(wrap(down - theta)) + slow_cost * (drive.speed - v) / drive.speed
+            left = togo_at(x, y, togo, x0, y0, coarse)
+            cost = left + near_cost * lack * lack + slow_cost * (drive.speed - v) / drive.speed
+            # At the goal any direction leads down: who minds it turns round and round beside it.
+            if left * drive.speed > coarse:
+                down, _ = way_down(x, y, ground)
+                cost += heading_cost * abs(wrap(down - theta))
             if cost < best:
                 best_v, best_w, best = v, w, cost
     return best_v, best_w, best

@@ -23,7 +23,7 @@ class LaserConfig(Config):
 
 @LOCALIZERS.add("laser", LaserConfig)
 class LaserLocalizer(WrappedLocalizer):
-    """What suits the map: `ekf-walls` where walls are given as lines, `particle-filter` where as cells.
+    """What suits the map: `ekf-walls` where walls are given as lines, `particle-filter` among cells or discs.
 
     The outlines of cells that a robot has mapped are a thousand short steps, which no line of a scan is: the
     wall filter would be lost or too sure of itself among them; where walls are lines it is the sharper of
@@ -41,8 +41,8 @@ class LaserLocalizer(WrappedLocalizer):
         journal: Journal,
     ) -> None:
         chosen: Localizer
-        if chart.geometry is not None:
+        if chart.geometry is not None and len(chart.reflectors.segments_m):
             chosen = EkfWallsLocalizer(config.walls, robot, chart, initial, journal)
-        else:  # on a map of cells mates tell nothing yet
+        else:  # mates tell it nothing yet
             chosen = ParticleFilterLocalizer(config.cells, robot, chart, initial, journal)
         super().__init__(chosen)

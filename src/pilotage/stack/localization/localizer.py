@@ -118,8 +118,8 @@ def require_walls(chart: WorldMap, name: str) -> None:
     """
     if not len(chart.reflectors.segments_m):
         raise InputError(
-            f"{name}: expected walls on the robot's map, found none that a beam ends at on '{chart.name}'; "
-            "see stack.map"
+            f"{name}: expected straight walls on the robot's map, found none that a beam ends at on "
+            f"'{chart.name}'; see stack.map, or take localizer particle-filter among discs or cells"
         )
 
 

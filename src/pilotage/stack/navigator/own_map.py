@@ -11,6 +11,8 @@ from pilotage.maps.near_walls import NearWalls
 from pilotage.maps.world_map import WorldMap
 from pilotage.stack.mapping.mapper import Mapper
 
+SHOWN_CELL_M = 0.05
+
 
 class OwnMap:
     """What the robot was told of, those parts that are near a place at hand, and the discs that it adds.
@@ -34,13 +36,30 @@ class OwnMap:
         self.barriers = self.walls if same else NearWalls(told.barriers.segments_m)
         self.known_circles_m = told.walls.circles_m
         self._mapper = mapper
-        self._nothing = self.known_circles_m[:0]
+        self._shown = self._mapped = self._found = self.known_circles_m[:0]
         self._circles = self._last_found = self.known_circles_m
+
+    def show(self, points_m: FloatArray) -> None:
+        """Put (K, 2) points on the map, in the place of those before: what it almost touched."""
+        cells = np.unique(np.rint(points_m / SHOWN_CELL_M), axis=0) * SHOWN_CELL_M
+        self._shown = np.column_stack([cells, np.full(len(cells), 0.5 * SHOWN_CELL_M)])
+        self._mapped = self._found = self._shown[:0]
+
+    def forgets(self) -> bool:
+        """Whether there was anything shown on the map, which is gone now."""
+        had = len(self._shown) > 0
+        self._shown = self._shown[:0]
+        return had
 
     @property
     def found_circles_m(self) -> FloatArray:
         """(M, 3) what the robot put on the map itself."""
-        return self._nothing if self._mapper is None else self._mapper.circles_m
+        mapped = self._shown[:0] if self._mapper is None else self._mapper.circles_m
+        if not len(self._shown):
+            return mapped
+        if mapped is not self._mapped or not len(self._found):
+            self._mapped, self._found = mapped, read_only(np.concatenate([mapped, self._shown]))
+        return self._found
 
     @property
     def circles_m(self) -> FloatArray:

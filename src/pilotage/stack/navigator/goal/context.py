@@ -12,7 +12,7 @@ from pilotage.kernels.geometry import plane
 from pilotage.sensors.readings import Readings
 from pilotage.stack.control.controller import Controller
 from pilotage.stack.control.give_way import GiveWay
-from pilotage.stack.control.guard import ArcGuard
+from pilotage.stack.control.guard import ArcGuard, ScanGuard
 from pilotage.stack.control.make_room import MakeRoom
 from pilotage.stack.control.reactive import Reaction, ReactionKind
 from pilotage.stack.interface import Belief, StackStatus
@@ -113,7 +113,7 @@ class Context:
         self.reactive, self._mapper, self.escape = parts.reactive, parts.mapper, parts.escape
         self.own_map, self.plan = own_map, plan
         self.follower = WaypointFollower(local_planner, controller, robot.dt_s)
-        self.guard = ArcGuard(config.guard, robot)
+        self.guard, self._scan_guard = ArcGuard(config.guard, robot), ScanGuard(robot)
         self.wandering = Wandering(config.wander, robot, localizer_of(parts, "goal"))
         progress_m = config.stall_progress_m
         self.stall = StallWatch(
@@ -159,8 +159,12 @@ class Context:
         return self.reaction.kind
 
     def make_plan(self, pose: Pose2, clearances_m: list[float]) -> PlanResult:
-        """Plan to the current goal on the own map."""
-        return self.plan.make(self.t_s, pose, self.goals[0], self.own_map.found_circles_m, clearances_m)
+        """Plan to the current goal on the own map; what it almost touched stands where it leaves a path."""
+        found = self.own_map.found_circles_m
+        result = self.plan.make(self.t_s, pose, self.goals[0], found, clearances_m)
+        if result.path is None and self.own_map.forgets():
+            return self.make_plan(pose, clearances_m)
+        return result
 
     def plan_around_people(self, pose: Pose2) -> PlanResult:
         """The same with those who walk about where they are now."""
@@ -177,6 +181,13 @@ class Context:
             self.journal.count("waits")
         self.stall.restart(self.t_s)
         return True
+
+    def meets_walls(self, command: Twist, readings: Readings, pose: Pose2) -> bool:
+        """Whether the laser shows no room for a command, whatever the map says; what it shows is mapped."""
+        touched_m = self._scan_guard.touched_m(command, readings)
+        if len(touched_m):
+            self.own_map.show(pose.placed(touched_m))
+        return len(touched_m) > 0
 
     @property
     def among_people(self) -> bool:

@@ -79,7 +79,14 @@ def drive(context: Context, state: Driving, readings: Readings, belief: Belief) 
     context.map_what_is_new(readings, belief)
     context.to_go_m = context.progress.update(pose)
     move = _guarded(context, state, readings, pose)
-    return give_way(context, move, pose) if context.waits(move.command, pose) else move
+    if context.waits(move.command, pose):
+        return give_way(context, move, pose)
+    if not context.meets_walls(move.command, readings, pose):
+        return move
+    if context.among_people:
+        context.follower.hold()
+        return Move(move.state, STOP)
+    return replan(context, _anew(context, state), pose, "the laser shows no room for the command")
 
 
 def give_way(context: Context, move: Move, pose: Pose2) -> Move:
