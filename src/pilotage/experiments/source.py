@@ -16,16 +16,13 @@ class ReadingSource(Protocol):
     @property
     def t_s(self) -> float:
         """Time of the last readings, seconds since the begin."""
-        ...
 
     @property
     def is_over(self) -> bool:
         """Whether nothing more will come."""
-        ...
 
     def step(self, commands: Sequence[Command]) -> Sequence[Readings]:
         """Carry out one command a robot, as far as it can, and return what each robot's sensors say."""
-        ...
 
 
 def stepped(

@@ -25,11 +25,9 @@ class Shown(Protocol):
 
     def __call__(self, progress: Progress) -> None:
         """Show it, if it is time for it."""
-        ...
 
     def close(self) -> None:
         """Wipe what was shown."""
-        ...
 
 
 class ProgressLine:

@@ -53,16 +53,13 @@ class ExplainableUpdate(Protocol):
     @property
     def left_out(self) -> int:
         """Lines that were not accepted."""
-        ...
 
     @property
     def largest_accepted(self) -> float:
         """Largest squared Mahalanobis distance of an accepted line; 0 without one."""
-        ...
 
     def explained(self) -> ScanUpdate:
         """Put the explanation together."""
-        ...
 
 
 class StackStatus(StrEnum):
@@ -103,16 +100,13 @@ class Stack(Protocol):
     @property
     def belief(self) -> Belief:
         """The current belief."""
-        ...
 
     @property
     def status(self) -> tuple[StackStatus, str]:
         """The task's status and, where it failed, why."""
-        ...
 
     def step(self, readings: Readings) -> Command:
         """Take in what the sensors said, give the next command."""
-        ...
 
 
 class WrappedStack:

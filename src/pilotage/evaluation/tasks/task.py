@@ -70,19 +70,15 @@ class Task(Protocol):
 
     def step(self, t_s: float, attempts: Sequence[Attempt]) -> str | None:
         """Look at every robot after a step; why the run is over, or None. Empty: the robots ended it."""
-        ...
 
     def row(self, index: int) -> tuple[float, ...]:
         """The task's numbers of the last step for one robot, in the order of ``columns``."""
-        ...
 
     def progress(self, attempts: Sequence[Attempt]) -> tuple[tuple[str, str], ...]:
         """The numbers that tell most while the run goes on: (label, text) each."""
-        ...
 
     def judge(self, run: FinishedRun) -> Verdict:
         """The metrics by JSON key, ``success`` and ``reason`` among them, and what else came to light."""
-        ...
 
 
 TASKS: Registry[Task] = Registry(

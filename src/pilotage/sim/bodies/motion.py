@@ -39,15 +39,12 @@ class SimulatedMotion(Protocol):
     @property
     def turned_rad(self) -> tuple[float, float] | None:
         """See above."""
-        ...
 
     def command(self, command: Command) -> None:
         """Fill ``moves`` for a step under a command."""
-        ...
 
     def stop(self) -> None:
         """Stand still: a contact ended the last step, or the robot was carried elsewhere."""
-        ...
 
 
 def _unfit_kept(motion: SimulatedMotion) -> str:

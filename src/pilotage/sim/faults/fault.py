@@ -49,7 +49,6 @@ class Fault(Protocol):
 
     def pass_on(self, t_s: float, readings: Sequence[Reading]) -> Sequence[Reading]:
         """What arrives in this step of what set out in it, none as a rule or one; called at every step."""
-        ...
 
 
 def _unfit(given: object, _: Fault, __: float, readings: Sequence[Reading]) -> str:

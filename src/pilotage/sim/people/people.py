@@ -75,7 +75,6 @@ class People(Protocol):
 
         First called with the start, then a step on each time; between two steps they walk straight.
         """
-        ...
 
 
 def _unfit_kept(people: People) -> str:

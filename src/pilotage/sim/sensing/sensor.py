@@ -48,7 +48,6 @@ class SimulatedSensor(Protocol):
 
     def read(self) -> Reading | None:
         """Give a reading, called when the sensor's period is over; None where it fails to arrive."""
-        ...
 
 
 class ReadTogether(Protocol):
@@ -57,12 +56,10 @@ class ReadTogether(Protocol):
     @staticmethod
     def alike(config: Any) -> object:
         """What sensors must have in common, beside their rate, to be read together."""
-        ...
 
     @classmethod
     def together(cls, sensors: Sequence[Any]) -> Callable[[], Sequence[Reading | None]]:
         """A function that reads sensors of this class, in their order."""
-        ...
 
 
 def _unfit(given: object, *_: object) -> str:

@@ -30,11 +30,9 @@ class Controller(Protocol):
 
     def reset(self) -> None:
         """Forget the past: the robot was moved by something else meanwhile."""
-        ...
 
     def step(self, pose: Pose2, reference: Pose2, feedforward: Twist) -> Control:
         """Give the command that follows ``reference`` from the estimated ``pose``."""
-        ...
 
 
 CONTROLLERS: Registry[Controller] = Registry(

@@ -15,11 +15,9 @@ class Escape(Protocol):
 
     def begin(self, trail: list[Pose2]) -> None:
         """Start an escape; ``trail`` is the way the robot came by, oldest first, for the escape to use up."""
-        ...
 
     def step(self, pose: Pose2) -> Twist | None:
         """Give the next command, or None when the escape is over."""
-        ...
 
 
 def _unfit(given: object, *_: object) -> str:

@@ -43,7 +43,6 @@ class Reactive(Protocol):
 
     def reset(self) -> None:
         """Forget an avoidance in progress."""
-        ...
 
     def step(
         self, readings: Readings, pose: Pose2, walls: NearWalls, circles_m: FloatArray, straight: bool
@@ -57,7 +56,6 @@ class Reactive(Protocol):
         straight
             Whether the plan goes straight on for the next metre or so.
         """
-        ...
 
 
 def _unfit(given: object, *_: object) -> str:

@@ -26,7 +26,6 @@ class ExplorerParts(Protocol):
     @property
     def heading(self) -> HeadingFilter | None:
         """The heading filter; None: the exploration report's."""
-        ...
 
 
 class Explorer(Protocol):
@@ -35,17 +34,14 @@ class Explorer(Protocol):
     @property
     def cells(self) -> CellMap:
         """The cell map as the robot would print it now, row 0 at the sheet's lower edge."""
-        ...
 
     @property
     def visited(self) -> BoolArray:
         """(rows, columns) the robot's own visited layer; marks of other layers do not overwrite it."""
-        ...
 
     @property
     def left(self) -> tuple[LeftCell, ...]:
         """Cells that it gave up, once it is done."""
-        ...
 
 
 def offer(journal: Journal, explorer: Explorer) -> None:

@@ -34,7 +34,6 @@ class HeadingFilter(Protocol):
     @property
     def estimate(self) -> HeadingEstimate:
         """The current estimate."""
-        ...
 
     def step(
         self,
@@ -63,7 +62,6 @@ class HeadingFilter(Protocol):
             For a ``dt_s`` that is not above 0, for numbers that are not finite, and where neither encoders
             nor gyroscope said anything.
         """
-        ...
 
 
 class HeadingErrors(Config):

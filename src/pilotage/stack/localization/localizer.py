@@ -34,11 +34,9 @@ class Localizer(Protocol):
     @property
     def belief(self) -> Belief:
         """The current belief."""
-        ...
 
     def step(self, readings: Readings) -> Belief:
         """Take in one step's readings and return the belief after them."""
-        ...
 
 
 def _anywhere() -> float | None:

@@ -23,11 +23,9 @@ class Mapper(Protocol):
     @property
     def circles_m(self) -> FloatArray:
         """(M, 3) x, y, radius of everything added so far."""
-        ...
 
     def step(self, readings: Readings, belief: Belief) -> bool:
         """Take in one step; True where something was added."""
-        ...
 
 
 def _unfit_kept(mapper: Mapper) -> str:

@@ -41,7 +41,6 @@ class GridPlanner(Protocol):
 
     def search(self, request: GridRequest) -> GridResult:
         """Answer one query; never raises for what can fail in the field."""
-        ...
 
 
 def unfit_cells(given: object, _: object, request: object) -> str:

@@ -57,7 +57,6 @@ class LocalPlanner(Protocol):
         self, pose: Pose2, route: RouteAhead, walls: NearWalls, circles_m: FloatArray
     ) -> LocalPath | None:
         """Plan to the first waypoint that can be reached; None where none of the next few can."""
-        ...
 
 
 def _unfit(given: object, *_: object) -> str:

@@ -154,11 +154,9 @@ class Planner(Protocol):
     @property
     def clearance_m(self) -> float:
         """Distance that it keeps from obstacles where a request names none."""
-        ...
 
     def plan(self, request: PlanRequest) -> PlanResult:
         """Answer one query; never raises for what can fail in the field."""
-        ...
 
 
 def outline_clearance_m(planner: Planner, outline: Footprint | None, as_planned: bool) -> float | None:
@@ -179,7 +177,6 @@ class Smoother(Protocol):
 
     def smooth(self, path: Path, request: PlanRequest, clearance_m: float) -> Path:
         """Return a path from the same start to the same goal that is valid and no longer than ``path``."""
-        ...
 
 
 def _unfit_plan(given: object, _: Planner, request: PlanRequest) -> str:

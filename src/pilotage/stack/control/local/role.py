@@ -122,12 +122,10 @@ class LocalController(Protocol):
 
     def step(self, view: LocalView) -> Twist:
         """Give the next command."""
-        ...
 
     @property
     def status(self) -> str:
         """What it is doing, in a word: driving, turning, backing, waiting, closed, arrived."""
-        ...
 
 
 def _unfit(given: object, controller: LocalController, *_: object) -> str:

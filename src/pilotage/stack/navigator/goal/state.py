@@ -14,7 +14,6 @@ class State(Protocol):
 
     def step(self, readings: Readings, belief: Belief) -> Move:
         """One control step: the command, and the state that the next step begins in."""
-        ...
 
 
 class Move(NamedTuple):

@@ -15,7 +15,6 @@ class State(Protocol):
 
     def step(self, readings: Readings, to: Transitions) -> Move:
         """One control step: the command, and the state that the next step begins in."""
-        ...
 
 
 class Move(NamedTuple):
@@ -30,24 +29,18 @@ class Transitions(Protocol):
 
     def arrive(self, context: Context) -> Move:
         """At where it drove to."""
-        ...
 
     def resume(self, context: Context) -> Move:
         """On with the patrol."""
-        ...
 
     def set_out(self, context: Context) -> State:
         """On to the hop."""
-        ...
 
     def forgo(self, context: Context, *, for_long: bool) -> Move | None:
         """Leave it to mates to go there; None where it has to itself."""
-        ...
 
     def give_way(self, context: Context) -> Move:
         """Out of the way."""
-        ...
 
     def meet(self, context: Context, stretch: Stretch | None, since_s: float) -> Move | None:
         """What comes of a passage for one ahead; None to drive on."""
-        ...
