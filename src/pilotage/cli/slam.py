@@ -12,6 +12,7 @@ import typer
 
 from pilotage.cli.options import Json, Out
 from pilotage.cli.output import print_columns, print_json, stdout_for_json
+from pilotage.face.progress import StatusLine
 
 _TOLD = (
     "log",
@@ -89,18 +90,15 @@ def _stages(wanted: bool) -> Iterator[Callable[[str, float], None] | None]:
     if not (wanted and sys.stderr.isatty()):
         yield None
         return
-    shown = [-1.0]
+    line, shown = StatusLine(sys.stderr), [-1.0]
 
     def show(text: str, share: float) -> None:
         if text == "matching" and share - shown[0] < 0.01 and share < 1.0:
             return
         shown[0] = share if text == "matching" else -1.0
-        told = f"{text} {share:.0%}" if text == "matching" else text
-        sys.stderr.write(f"\r{told}\x1b[K")
-        sys.stderr.flush()
+        line.show(f"{text} {share:.0%}" if text == "matching" else text)
 
     try:
         yield show
     finally:
-        sys.stderr.write("\r\x1b[K")
-        sys.stderr.flush()
+        line.close()

@@ -6,6 +6,7 @@ import sys
 from typing import TYPE_CHECKING
 
 from pilotage.core.shown import visible
+from pilotage.face.progress import StatusLine
 
 if TYPE_CHECKING:
     from pilotage.experiments.studies.engine import StudyProgress
@@ -14,35 +15,22 @@ TROUBLES = 20
 """So many lines are read; a thousand are not."""
 
 
-class StudyLine:
+class StudyLine(StatusLine):
     """How far the study is, on standard error."""
 
     def __init__(self, quiet: bool) -> None:
-        from time import monotonic
-
-        self._clock = monotonic
+        super().__init__(sys.stderr, period_s=0.2)
         self._quiet = quiet
-        self._terminal = sys.stderr.isatty()
-        self._period_s = 0.2 if self._terminal else 10.0
-        self._next_s = monotonic() + (0.0 if self._terminal else self._period_s)
-        self._drawn = False
         self._troubles = 0
 
     def __call__(self, progress: StudyProgress) -> None:
-        now_s = self._clock()
-        if self._quiet or now_s < self._next_s:
+        if self._quiet or not self.is_due():
             return
-        self._next_s = now_s + self._period_s
         counts = progress.counts
         left = f"{progress.left_s:.0f} s left" if progress.left_s < 1e9 else "no rate yet"
         failed = f", {counts.failed} failed" if counts.failed else ""
         ended = counts.done + counts.failed
-        text = f"{ended} of {counts.total} trials{failed}, {progress.rate_per_s:.1f}/s, {left}"
-        print(
-            f"\r{text}\x1b[K" if self._terminal else text, end="" if self._terminal else "\n", file=sys.stderr
-        )
-        sys.stderr.flush()
-        self._drawn = self._terminal
+        self.show(f"{ended} of {counts.total} trials{failed}, {progress.rate_per_s:.1f}/s, {left}")
 
     def trouble(self, text: str) -> None:
         """Say what went wrong on the way, as long as it is worth reading."""
@@ -56,9 +44,3 @@ class StudyLine:
         """Say one line that stays."""
         self.close()
         print(f"pilotage: {visible(text)}", file=sys.stderr)
-
-    def close(self) -> None:
-        """Wipe the line."""
-        if self._drawn:
-            print("\r\x1b[K", end="", file=sys.stderr)
-            self._drawn = False

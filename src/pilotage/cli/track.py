@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -14,6 +13,7 @@ import typer
 from pilotage.cli.options import Json
 from pilotage.cli.output import print_columns, print_json, print_line
 from pilotage.core.whole_file import made_folder
+from pilotage.face.progress import StatusLine
 
 
 def track(
@@ -98,25 +98,16 @@ def track(
 @contextmanager
 def _progress(what: str) -> Iterator[Callable[[int, int], None]]:
     """Yield what shows how far a pass is: a bar on a terminal, a line now and then elsewhere."""
-    terminal = sys.stderr.isatty()
-    period_s = 0.1 if terminal else 10.0
-    due_s = time.monotonic() + (0.0 if terminal else period_s)
+    line = StatusLine(sys.stderr)
 
     def show(done: int, promised: int) -> None:
-        nonlocal due_s
-        now_s = time.monotonic()
-        if now_s < due_s:
+        if not line.is_due():
             return
-        due_s = now_s + period_s
         share = min(done / promised, 1.0) if promised else 0.0
         bar = "#" * round(30 * share) + "-" * (30 - round(30 * share))
-        text = f"{what} [{bar}] frame {done}" + (f" of {promised}" if promised else "")
-        sys.stderr.write(f"\r{text}\x1b[K" if terminal else f"{text}\n")
-        sys.stderr.flush()
+        line.show(f"{what} [{bar}] frame {done}" + (f" of {promised}" if promised else ""))
 
     try:
         yield show
     finally:
-        if terminal:
-            sys.stderr.write("\r\x1b[K")
-            sys.stderr.flush()
+        line.close()

@@ -30,8 +30,8 @@ class Shown(Protocol):
         """Wipe what was shown."""
 
 
-class ProgressLine:
-    """Where a run stands, on standard error: one line that rewrites itself on a terminal.
+class StatusLine:
+    """One line on standard error that rewrites itself on a terminal.
 
     Elsewhere a plain line from time to time, so that a log shows life and stays short.
 
@@ -41,26 +41,32 @@ class ProgressLine:
         Standard error.
     clock_s
         A monotonic clock.
+    period_s
+        Between two texts on a terminal.
     """
 
-    _TERMINAL_PERIOD_S = 0.1
     _LOG_PERIOD_S = 10.0
 
-    def __init__(self, stream: TextIO, clock_s: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self, stream: TextIO, clock_s: Callable[[], float] = time.monotonic, period_s: float = 0.1
+    ) -> None:
         self._stream = stream
         self._clock_s = clock_s
         self._terminal = stream.isatty() and os.environ.get("TERM") != "dumb"
-        self._period_s = self._TERMINAL_PERIOD_S if self._terminal else self._LOG_PERIOD_S
+        self._period_s = period_s if self._terminal else self._LOG_PERIOD_S
         self._next_s = clock_s() + (0.0 if self._terminal else self._period_s)
         self._drawn = False
 
-    def __call__(self, progress: Progress) -> None:
-        """Show ``progress`` if it is time for it."""
+    def is_due(self) -> bool:
+        """Whether it is time for another text; counts from now on if so."""
         now_s = self._clock_s()
         if now_s < self._next_s:
-            return
+            return False
         self._next_s = now_s + self._period_s
-        text = progress_text(progress)
+        return True
+
+    def show(self, text: str) -> None:
+        """Show a text in the place of the last one."""
         self._stream.write(f"\r{text}\x1b[K" if self._terminal else f"{text}\n")
         self._stream.flush()
         self._drawn = self._terminal
@@ -71,6 +77,15 @@ class ProgressLine:
             self._stream.write("\r\x1b[K")
             self._stream.flush()
             self._drawn = False
+
+
+class ProgressLine(StatusLine):
+    """Where a run stands, on standard error."""
+
+    def __call__(self, progress: Progress) -> None:
+        """Show ``progress`` if it is time for it."""
+        if self.is_due():
+            self.show(progress_text(progress))
 
 
 class NotebookLine:
