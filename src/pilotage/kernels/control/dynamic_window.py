@@ -6,7 +6,7 @@ import math
 
 from pilotage.kernels.arrays import FloatArray
 from pilotage.kernels.control.footprint import Body
-from pilotage.kernels.control.ground import Ground, clearance_of, disc_seen, seen_under
+from pilotage.kernels.control.ground import Ground, clearance_m, clearance_of, disc_seen, seen_under
 from pilotage.kernels.control.motion_limits import Drive
 from pilotage.kernels.control.rollouts import way_down
 from pilotage.kernels.control.togo import togo_at
@@ -66,36 +66,9 @@ def choose_in_window(
     low_v, high_v, low_w, high_w = window(start[3], start[4], dt, drive)
     best_v = max(low_v, 0.0) if start[3] >= 0.0 else min(high_v, 0.0)
     best_w, best = min(max(0.0, low_w), high_w), math.inf
-    at_rest = clearance_of(
-        start[0],
-        start[1],
-        math.cos(start[2]),
-        math.sin(start[2]),
-        polygon,
-        outer,
-        discs,
-        hits,
-        nearest,
-        mean,
-        x0,
-        y0,
-        cell,
-        per_cell,
-        margin,
-    )
-    seen_at_rest = seen_under(
-        start[0],
-        start[1],
-        math.cos(start[2]),
-        math.sin(start[2]),
-        outer,
-        discs,
-        unseen,
-        x0,
-        y0,
-        coarse,
-        per_coarse,
-    )
+    at_rest = clearance_m(start[0], start[1], start[2], body, ground, margin)
+    c, s = math.cos(start[2]), math.sin(start[2])
+    seen_at_rest = seen_under(start[0], start[1], c, s, outer, discs, unseen, x0, y0, coarse, per_coarse)
     # No nearer at all from within the margin: by a millimetre a step it would be through in seconds.
     floor = min(margin, at_rest - ROUNDING_M)
     for i in range(speeds):
