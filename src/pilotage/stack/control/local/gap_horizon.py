@@ -11,7 +11,6 @@ from pilotage.kernels.control.band import path_distances
 from pilotage.kernels.control.evasion import best_evasion
 from pilotage.kernels.control.ground import nearest_m
 from pilotage.kernels.control.motion_limits import Drive, approach, command_is_safe
-from pilotage.kernels.control.rollouts import Price
 from pilotage.kernels.control.scan_ends import cleaned_ranges, scan_points
 from pilotage.kernels.control.togo import UNREACHED_S, togo_at
 from pilotage.stack.control.local.among_people import AmongPeople
@@ -111,22 +110,8 @@ class GapHorizon(RollingController):
             if self._turn is not None and command is not None:
                 return command
             self._turn = None
-        price = Price(
-            config.margin_m,
-            config.margin_s,
-            config.soft_m,
-            config.near_cost,
-            config.heading_s_per_rad,
-            config.turning_cost_s,
-            config.reverse_cost,
-            config.no_stop_s,
-            float(scene.goal[0]),
-            float(scene.goal[1]),
-            view.goal_tolerance_m,
-            self._worse(scene).deceleration / scene.drive.deceleration,
-            config.people_cost,
-            config.comfort_m,
-        )
+        trust = self._worse(scene).deceleration / scene.drive.deceleration
+        price = config.price(view, scene, config.margin_s, trust)
         plans, costs = self._pool.priced(scene, price, self._plan)
         for i in np.argsort(costs)[:6]:
             command = self._checked(scene, plans[i][0])

@@ -1,30 +1,70 @@
-"""What `gap-horizon` samples, prices and keeps away from."""
+"""What controllers that sample plans draw and price, and what `gap-horizon` keeps away from besides."""
 
 from __future__ import annotations
 
 from pydantic import Field
 
 from pilotage.core.config import Config
+from pilotage.kernels.control.rollouts import Price
 from pilotage.sensors.sensor import NonNegative, Positive
+from pilotage.stack.control.local.role import LocalView
+from pilotage.stack.control.local.rolling import Scene
 from pilotage.stack.control.local.rolling_config import RollingConfig
 
 Share = Field(default=0.65, gt=0.0, le=1.0)
 
 
-class GapHorizonConfig(Config):
+class SampledPlansConfig(Config):
     """Horizon, samples and what a plan costs beside its time."""
 
     ground: RollingConfig = RollingConfig()
+    horizon_s: Positive = 2.0
+    step_s: Positive = 0.1
+    rollouts: int = Field(default=1000, ge=8, le=20000)
+    speed_std_m_s: Positive = 0.5
+    turn_std_rad_s: Positive = 1.2
+    temperature_s: Positive = 0.1
+    margin_m: NonNegative = 0.05
+    soft_m: Positive = 0.15
+    near_cost: NonNegative = 1.0
+    heading_s_per_rad: NonNegative = 0.25
+    turning_cost_s: NonNegative = 0.01
+    reverse_cost: NonNegative = 1.0
+    no_stop_s: NonNegative = 30.0
+    people_cost: NonNegative = 1.5
+    comfort_m: Positive = 0.5
+
+    def price(self, view: LocalView, scene: Scene, margin_s: float, trust: float) -> Price:
+        """As kernels take it: ``margin_s`` is kept more per m/s, ``trust`` the share of braking relied on."""
+        return Price(
+            self.margin_m,
+            margin_s,
+            self.soft_m,
+            self.near_cost,
+            self.heading_s_per_rad,
+            self.turning_cost_s,
+            self.reverse_cost,
+            self.no_stop_s,
+            float(scene.goal[0]),
+            float(scene.goal[1]),
+            view.goal_tolerance_m,
+            trust,
+            self.people_cost,
+            self.comfort_m,
+        )
+
+
+class GapHorizonConfig(SampledPlansConfig):
+    """The same for few plans that are checked besides, and its manners among people and in narrow places."""
+
     horizon_s: Positive = 1.0
     far_horizon_s: Positive = 1.6
     """The same close to the goal, with a moving body in sight, or a place ahead that only an outline that
     stands straight gets through: it has to be lined up for early. Elsewhere as many samples of a shorter plan
     find a better one."""
-    step_s: Positive = 0.1
     rollouts: int = Field(default=192, ge=8, le=20000)
     resample_steps: int = Field(default=2, ge=1, le=100)
     """New samples are drawn every so many steps; between them the last plan goes on, checked as ever."""
-    speed_std_m_s: Positive = 0.5
     turn_std_rad_s: Positive = 1.0
     temperature_s: Positive = 0.05
     margin_m: NonNegative = 0.015
@@ -38,12 +78,6 @@ class GapHorizonConfig(Config):
     squeezed_m_s: Positive = 0.35
     """With an obstacle point nearer than ``least_margin_m`` it drives no faster: which side is nearer than
     believed the next readings tell."""
-    soft_m: Positive = 0.15
-    near_cost: NonNegative = 1.0
-    heading_s_per_rad: NonNegative = 0.25
-    turning_cost_s: NonNegative = 0.01
-    reverse_cost: NonNegative = 1.0
-    no_stop_s: NonNegative = 30.0
     brake_trust: float = Share
     """Share of the data sheet's braking and turning that is relied on."""
     people_margin_m: NonNegative = 0.05
@@ -52,8 +86,6 @@ class GapHorizonConfig(Config):
     """By so many standard deviations of the foretold place it may be nearer."""
     people_hold_s: NonNegative = 0.3
     """Near people a command that speeds up has to be good for so long before the braking begins."""
-    people_cost: NonNegative = 1.5
-    comfort_m: Positive = 0.5
     calm_m: NonNegative = 2.5
     calm_m_s: Positive = 1.4
     calm_rad_s: Positive = 2.0

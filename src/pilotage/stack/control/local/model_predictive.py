@@ -3,38 +3,18 @@
 from __future__ import annotations
 
 import numpy as np
-from pydantic import Field
 
-from pilotage.core.config import Config
 from pilotage.core.types import Twist
-from pilotage.kernels.control.rollouts import Price, later, rollout_costs, weighted_mean
-from pilotage.sensors.sensor import NonNegative, Positive
+from pilotage.kernels.control.rollouts import later, rollout_costs, weighted_mean
+from pilotage.stack.control.local.gap_horizon_config import SampledPlansConfig
 from pilotage.stack.control.local.role import LOCAL_CONTROLLERS, LocalView
 from pilotage.stack.control.local.rolling import Scene
-from pilotage.stack.control.local.rolling_config import RollingConfig
 from pilotage.stack.control.local.rolling_step import RollingController
 from pilotage.stack.control.local.sampling import NoiseBank
 
 
-class MppiConfig(Config):
-    """Samples, horizon and prices."""
-
-    ground: RollingConfig = RollingConfig()
-    horizon_s: Positive = 2.0
-    step_s: Positive = 0.1
-    rollouts: int = Field(default=1000, ge=8, le=20000)
-    speed_std_m_s: Positive = 0.5
-    turn_std_rad_s: Positive = 1.2
-    temperature_s: Positive = 0.1
-    margin_m: NonNegative = 0.05
-    soft_m: Positive = 0.15
-    near_cost: NonNegative = 1.0
-    heading_s_per_rad: NonNegative = 0.25
-    turning_cost_s: NonNegative = 0.01
-    reverse_cost: NonNegative = 1.0
-    no_stop_s: NonNegative = 30.0
-    people_cost: NonNegative = 1.5
-    comfort_m: Positive = 0.5
+class MppiConfig(SampledPlansConfig):
+    """Thousands of samples of a long horizon."""
 
 
 @LOCAL_CONTROLLERS.add("mppi", MppiConfig)
@@ -57,22 +37,6 @@ class Mppi(RollingController):
 
     def _decide(self, view: LocalView, scene: Scene) -> Twist:
         config = self._config
-        price = Price(
-            config.margin_m,
-            0.0,
-            config.soft_m,
-            config.near_cost,
-            config.heading_s_per_rad,
-            config.turning_cost_s,
-            config.reverse_cost,
-            config.no_stop_s,
-            float(scene.goal[0]),
-            float(scene.goal[1]),
-            view.goal_tolerance_m,
-            1.0,
-            config.people_cost,
-            config.comfort_m,
-        )
         mean = later(self._mean, scene.dt_s / config.step_s)
         costs = rollout_costs(
             scene.start,
@@ -83,7 +47,7 @@ class Mppi(RollingController):
             scene.body,
             scene.ground,
             scene.movers.foretold(scene.delay_s + config.step_s, config.step_s, self._steps),
-            price,
+            config.price(view, scene, 0.0, 1.0),
             self._commands,
         )
         self._mean = weighted_mean(self._commands, costs, config.temperature_s)
