@@ -21,6 +21,7 @@ from pilotage.experiments.oracles.truth import Truth
 from pilotage.maps.world_map import WorldMap
 from pilotage.models.footprint import Footprint
 from pilotage.models.motion.bicycle import BicycleConfig
+from pilotage.models.motion.differential_drive import DifferentialDriveConfig
 from pilotage.sim.source import RobotSpec
 from pilotage.stack.control.polar_pose import PolarPoseConfig, PolarPoseController
 from pilotage.stack.interface import Belief, StackStatus
@@ -143,12 +144,27 @@ class TestPolarPose:
     )
     def test_gains_that_cannot_be_stable_are_refused(self, gain: str, value: float) -> None:
         with pytest.raises(ValidationError, match=rf"{gain}[\s\S]*(stable|finite)"):
-            PolarPoseConfig.model_validate({gain: value})
+            PolarPoseConfig.model_validate({"rho_gain_per_s": 1.3e-3, gain: value})
+
+    def test_gains_that_are_not_given_follow_from_those_that_are_or_from_the_robot(self) -> None:
+        """A robot on a floor had the rover's: a millimetre a second."""
+        report = (1.3e-3, 1.5e-3, -1.9e-3)
+        for one in ({"rho_gain_per_s": 1.3e-3}, {"alpha_gain_per_s": 1.5e-3}, {"beta_gain_per_s": -1.9e-3}):
+            assert PolarPoseConfig.model_validate(one).gains_per_s(ROVER, 10.0) == pytest.approx(report)
+        with pytest.raises(ValidationError, match="K_alpha > K_rho"):
+            PolarPoseConfig(alpha_gain_per_s=1e-3, beta_gain_per_s=-1.9e-3)
+        base = DifferentialDriveConfig(max_speed_m_s=1.0, max_turn_rate_rad_s=2.0)
+        rho, alpha, beta = PolarPoseConfig().gains_per_s(base, 0.1)
+        assert math.pi * (alpha - beta) <= 2.0 + 1e-9
+        assert rho * 1.0 <= base.braking_m_s2 + 1e-9
+        assert rho > 0.1
+        assert PolarPoseConfig().gains_per_s(ROVER, 10.0)[0] == pytest.approx(0.01)
 
     def test_the_steering_limit_is_the_bodys(self) -> None:
         """The law may ask for more; what drives keeps tan(gamma) = L w / v within its limit."""
         stiff = ROVER.model_copy(update={"max_steering_rad": 0.1})
-        law = PolarPoseController(PolarPoseConfig(alpha_gain_per_s=1.0), Pose2(0.0, 0.0, 0.0), 0.04)
+        gains = PolarPoseConfig(rho_gain_per_s=1.3e-3, alpha_gain_per_s=1.0, beta_gain_per_s=-1.9e-3)
+        law = PolarPoseController(gains, Pose2(0.0, 0.0, 0.0), stiff, 1.0)
         for theta in np.linspace(-3.0, 3.0, 13):
             sim = rover(Pose2(-50.0, 20.0, float(theta)), stiff, sample_s=1.0)
             for _ in range(3):

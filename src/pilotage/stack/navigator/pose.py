@@ -53,7 +53,7 @@ class PoseNavigator(LocalizingNavigator):
             raise InputError("navigator 'pose': expected world.goal with theta_rad, found none")
         super().__init__(localizer_of(parts, "pose"), journal)
         pose = Pose2(goal.x_m, goal.y_m, goal.theta_rad)
-        self._law = PolarPoseController(config, pose, robot.motion.top_speed_m_s)
+        self._law = PolarPoseController(config, pose, robot.motion, robot.dt_s)
         self._tolerance_m = arrival_within_m(config.arrival_m, task.goal_tolerance_m)
         self._channel = journal.channel({"distance_to_go_m": "m"})
 
