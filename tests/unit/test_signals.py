@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM, wherever they strike: one line, 130 or 143."""
+"""Ctrl-C, SIGTERM and SIGHUP, wherever they strike: one line, 130, 143 or 129."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def test_a_signal_at_any_moment_of_a_run_is_one_line(tmp_path: Path) -> None:
     moments = random.Random(5)
     child = start(tmp_path / "streams", endless, False, folder=tmp_path)
     codes = []
-    sent = [moments.choice([signal.SIGINT, signal.SIGTERM]) for _ in range(SIGNALS)]
+    sent = [moments.choice([signal.SIGINT, signal.SIGTERM, signal.SIGHUP]) for _ in range(SIGNALS)]
     try:
         for k, number in enumerate(sent):
             assert child.line(2 * k) == "ready\n", child.err.read_text()
@@ -43,12 +43,18 @@ def test_a_signal_at_any_moment_of_a_run_is_one_line(tmp_path: Path) -> None:
     finally:
         child.process.kill()
         err = child.ended().stderr
-    assert codes == [130 if number == signal.SIGINT else 143 for number in sent], err
-    lines = {130: "pilotage: interrupted", 143: "pilotage: ended by SIGTERM"}
+    assert codes == [128 + number for number in sent], err
+    lines = {
+        130: "pilotage: interrupted",
+        143: "pilotage: ended by SIGTERM",
+        129: "pilotage: ended by SIGHUP",
+    }
     assert err.splitlines() == [lines[code] for code in codes]
 
 
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+@pytest.mark.parametrize(
+    ("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGHUP, 129)]
+)
 def test_a_second_signal_changes_nothing(number: int, code: int, tmp_path: Path) -> None:
     child = start(tmp_path / "streams", endless, True, folder=tmp_path)
     assert child.line(0) == "ready\n"
