@@ -88,6 +88,26 @@ def test_what_an_interruption_leaves_half_made_is_not_told() -> None:
     assert (child.returncode, child.stderr) == (143, "pilotage: ended by SIGTERM\n")
 
 
+COMPILED = """
+import sys
+from pilotage.cli import app
+from pilotage.cli.main import main
+
+sys.argv[1:] = ["missions"]
+app.dispatch = lambda _: exec("import os, signal, time; os.kill(os.getpid(), signal.SIGINT); time.sleep(60)")
+sys.exit(main())
+"""
+
+
+def test_one_that_strikes_in_code_compiled_from_text_has_its_exit_code(tmp_path: Path) -> None:
+    """As libraries make it: ``python -m pilotage`` then ended by SIGINT, two of five times as workers start."""
+    (tmp_path / "compiled.py").write_text(COMPILED)
+    child = subprocess.run(
+        [sys.executable, "-m", "compiled"], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert (child.returncode, child.stderr) == (130, "pilotage: interrupted\n")
+
+
 CAST = """
 import ctypes, os, signal, sys
 import pilotage

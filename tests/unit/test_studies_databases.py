@@ -11,6 +11,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -99,6 +100,19 @@ def test_a_broken_database_is_told_in_one_line_and_what_is_left_is_exported(
         for entry in saved[1:]:
             row = dict(zip(header, entry.split(","), strict=True))
             assert float(row["planned_length_m"]) == expected(int(row["row"]))["planned_length_m"]
+
+
+def test_a_row_that_nothing_made_leaves_no_log(finished: Path, tmp_path: Path) -> None:
+    """The error held a cursor on its way, that the database, and that its log until it was collected."""
+    folder = tmp_path / "x"
+    shutil.copytree(finished, folder)
+    with closing(sqlite3.connect(folder / DATABASE)) as database:
+        database.execute("update trials set status = 'x' where row = 0")
+        database.commit()
+    before = {path.name for path in folder.iterdir()}
+    with pytest.raises(InputError, match="row 0 neither waits nor runs"):
+        run_study(study_of(trials=100), folder, StudyOptions(workers=1, resume=True))
+    assert {path.name for path in folder.iterdir()} - before == {"trials-salvaged.csv"}
 
 
 def test_a_definition_with_fewer_settings_than_its_trials_is_told_in_one_line(
