@@ -100,7 +100,7 @@ sys.exit(main())
 
 
 def test_one_that_strikes_in_code_compiled_from_text_has_its_exit_code(tmp_path: Path) -> None:
-    """As libraries make it: ``python -m pilotage`` then ended by SIGINT, two of five times as workers start."""
+    """As libraries make it: ``python -m pilotage`` ended by SIGINT, two of five times as workers started."""
     (tmp_path / "compiled.py").write_text(COMPILED)
     child = subprocess.run(
         [sys.executable, "-m", "compiled"], cwd=tmp_path, capture_output=True, text=True, check=False

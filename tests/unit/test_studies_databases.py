@@ -107,7 +107,7 @@ def test_a_row_that_nothing_made_leaves_no_log(finished: Path, tmp_path: Path) -
     folder = tmp_path / "x"
     shutil.copytree(finished, folder)
     with closing(sqlite3.connect(folder / DATABASE)) as database:
-        database.execute("update trials set status = 'x' where row = 0")
+        database.execute("update trials set status = 'x'")
         database.commit()
     before = {path.name for path in folder.iterdir()}
     with pytest.raises(InputError, match="row 0 neither waits nor runs"):

@@ -54,8 +54,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with _ended_once(for_good=arguments is None) as struck:
             return _run(sys.argv[1:] if arguments is None else list(arguments), struck)
     except KeyboardInterrupt as stop:
-        # One that struck in code compiled from text, as libraries make it, would have `python -m pilotage` end
-        # by SIGINT, whatever the exit code: other code from text takes that back.
+        # One that struck in code compiled from text, as libraries make it, has `python -m pilotage` end by
+        # SIGINT, whatever the exit code: other code from text takes that back.
         exec("")
         if arguments is None:
             # The process ends: of objects left half made, whose destructors fail, there is nothing to tell.
