@@ -19,7 +19,6 @@ from typing import TypeVar
 
 from pilotage.core.errors import InputError
 from pilotage.core.files import require_file
-from pilotage.core.json_text import load_json
 from pilotage.experiments.studies.database import (
     DATABASE,
     SCHEMA,
@@ -28,6 +27,7 @@ from pilotage.experiments.studies.database import (
     checksum,
     close_gently,
     connect,
+    essence_told,
     foreign_tables,
     is_full,
     put_in_place,
@@ -237,7 +237,7 @@ class Store:
         found = dict(self._db.execute("select key, value from meta").fetchall())
         if found.get("digest") == study.digest:
             return
-        made_from = load_json(found.get("essence", "{}"), str(self.path))
+        made_from = essence_told(found.get("essence", "{}"), self.path)
         if is_made_from(study, made_from):
             return
         raise InputError(
