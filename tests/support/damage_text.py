@@ -218,7 +218,7 @@ def tagged(data: bytes, rng: Random) -> bytes:
 def exchanged(data: bytes, rng: Random) -> bytes:
     """Two values in each other's place, a key under another's name, or a value in many places."""
     pattern = rng.choice(
-        (VALUE, NUMBER, re.compile(rb"[A-Za-z_][\w-]*(?=\"?: )"), re.compile(rb"[A-Za-z_-]+"))
+        (VALUE, NUMBER, re.compile(rb"(?<![\w-])[A-Za-z_][\w-]*(?=\"?: )"), re.compile(rb"[A-Za-z_-]+"))
     )
     found = list(pattern.finditer(data))
     if len(found) < 2:

@@ -18,8 +18,9 @@ from pilotage.experiments.given import has
 from pilotage.experiments.mission import load_mission, shipped_missions
 from pilotage.experiments.run import run_mission
 from pilotage.experiments.studies import attribution
+from pilotage.experiments.studies.asked import Asked
 from pilotage.experiments.studies.attribution import attribution_of, attribution_study, is_attribution
-from pilotage.experiments.studies.engine import check_asked, run_study
+from pilotage.experiments.studies.engine import run_study
 from pilotage.experiments.studies.options import StudyOptions
 from pilotage.experiments.studies.rows import flat
 from pilotage.experiments.studies.sweep import sweep_study
@@ -224,4 +225,4 @@ def test_runs_within_the_start_phase_are_refused_before_the_first_trial() -> Non
         "museum-1", ["stack.localizer.gate=0.9,0.99"], ["run.time_limit_s=1"], 1, ("nees_mean",)
     )
     with pytest.raises(InputError, match=r"metric 'nees_mean': .* runs that end within it"):
-        check_asked(sweep)
+        Asked(sweep).check_tasks()

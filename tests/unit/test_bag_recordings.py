@@ -338,6 +338,17 @@ def test_where_no_robot_was_is_left_out_and_told(tmp_path: Path) -> None:
     assert any("1 messages of /odom" in text for text in found.warnings)
 
 
+def test_a_landmark_beyond_all_sight_is_left_out(table: Path, tmp_path: Path) -> None:
+    """One detection at 1e9 m ended in a traceback: no sensor reaches so far."""
+    drive = circle("vision")
+    tags = [stamped for stamped in drive.stamped if stamped.topic == "/tags"]
+    for one in tags[3].fields["detections"]:
+        one["results"][0]["pose"]["pose"]["position"]["x"] = 1e9
+    write_mcap(tmp_path / "a.mcap", drive)
+    run = pl.localize(tmp_path / "a.mcap", landmarks=table, out=tmp_path)
+    assert run.metrics["position_rmse_m"] < 0.02
+
+
 @pytest.mark.parametrize("name", WRITERS)
 def test_what_a_base_makes_of_its_commands(tmp_path: Path, name: str) -> None:
     WRITERS[name](tmp_path / name, commanded())

@@ -9,15 +9,17 @@ import os
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 import pilotage as pl
 from pilotage.bridges.ros import messages as ros
-from pilotage.bridges.ros.driving import _increment, _ranges
+from pilotage.bridges.ros.driving import LiveReadings, _increment, _ranges
 from pilotage.bridges.ros.serving import moved
 from pilotage.cli.main import main
 from pilotage.core.angles import wrap_to_pi
@@ -171,6 +173,39 @@ def test_what_a_driver_says_of_beams_without_a_range_is_understood() -> None:
     assert _ranges(message, far).tolist() == pytest.approx([*read[:4], *[math.nan] * 3], nan_ok=True)
     unset = _scan(-0.3, 0.1, [3.0] * 7, range_max=0.0)
     assert _ranges(unset, sheet).tolist() == [3.0] * 7
+
+
+def _odometry(t_s: int, x_m: float, w: float = 1.0, z: float = 0.0) -> SimpleNamespace:
+    stamp = SimpleNamespace(sec=t_s, nanosec=0)
+    pose = SimpleNamespace(
+        position=SimpleNamespace(x=x_m, y=0.0), orientation=SimpleNamespace(x=0.0, y=0.0, z=z, w=w)
+    )
+    return SimpleNamespace(header=SimpleNamespace(stamp=stamp), pose=SimpleNamespace(pose=pose))
+
+
+def test_messages_that_say_nothing_are_counted_and_not_driven_by() -> None:
+    """One NaN of /odom made the belief NaN for good, and the robot drove by it; 1e308 was a traceback."""
+    nan, hear = math.nan, dict[str, Callable[[Any], None]]()
+    node: Any = SimpleNamespace(
+        spin_until=lambda _: None, listens=lambda topic, _, heard: hear.update({topic: heard})
+    )
+    source = LiveReadings(node, ("lidar", LidarConfig(beams=3)), "odometry", 0.5)
+    hear["/odom"](_odometry(1, 0.0))
+    for wrong in (_odometry(2, nan), _odometry(2, 1e308), _odometry(2, 1.0, w=0.0), _odometry(2, 1.0, z=nan)):
+        hear["/odom"](wrong)
+    hear["/odom"](_odometry(1, 5.0))  # not later
+    for first_rad, step_rad in ((nan, 0.1), (0.0, nan), (0.0, 0.0), (1e30, 0.1), (0.0, 1e30)):
+        hear["/scan"](_scan(first_rad, step_rad, [1.0] * 3))
+    assert source.refused == {"/odom": 5, "/scan": 5}
+
+
+@pytest.mark.parametrize("step_rad", [0.0, 1e-30, 1.0])
+def test_a_scan_of_one_beam_has_no_step(step_rad: float) -> None:
+    """A tiny one was divided by, and gave a warning for a direction."""
+    sheet = LidarConfig(beams=3, field_of_view_rad=2.0)
+    assert sheet.along_own_beams(np.array([1.5]), 0.0, step_rad).tolist() == pytest.approx(
+        [math.nan, 1.5, math.nan], nan_ok=True
+    )
 
 
 def test_times_are_whole_nanoseconds() -> None:

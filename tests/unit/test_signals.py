@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM, wherever they strike: one line, 130 or 143."""
+"""Ctrl-C, SIGTERM and SIGHUP, wherever they strike: one line, 130, 143 or 129."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def test_a_signal_at_any_moment_of_a_run_is_one_line(tmp_path: Path) -> None:
     moments = random.Random(5)
     child = start(tmp_path / "streams", endless, False, folder=tmp_path)
     codes = []
-    sent = [moments.choice([signal.SIGINT, signal.SIGTERM]) for _ in range(SIGNALS)]
+    sent = [moments.choice([signal.SIGINT, signal.SIGTERM, signal.SIGHUP]) for _ in range(SIGNALS)]
     try:
         for k, number in enumerate(sent):
             assert child.line(2 * k) == "ready\n", child.err.read_text()
@@ -43,12 +43,18 @@ def test_a_signal_at_any_moment_of_a_run_is_one_line(tmp_path: Path) -> None:
     finally:
         child.process.kill()
         err = child.ended().stderr
-    assert codes == [130 if number == signal.SIGINT else 143 for number in sent], err
-    lines = {130: "pilotage: interrupted", 143: "pilotage: ended by SIGTERM"}
+    assert codes == [128 + number for number in sent], err
+    lines = {
+        130: "pilotage: interrupted",
+        143: "pilotage: ended by SIGTERM",
+        129: "pilotage: ended by SIGHUP",
+    }
     assert err.splitlines() == [lines[code] for code in codes]
 
 
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+@pytest.mark.parametrize(
+    ("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGHUP, 129)]
+)
 def test_a_second_signal_changes_nothing(number: int, code: int, tmp_path: Path) -> None:
     child = start(tmp_path / "streams", endless, True, folder=tmp_path)
     assert child.line(0) == "ready\n"
@@ -80,6 +86,26 @@ def test_what_an_interruption_leaves_half_made_is_not_told() -> None:
     """Compiled code that is just loaded: its destructor misses what its beginning was to make."""
     child = subprocess.run([sys.executable, "-c", HALF_MADE], capture_output=True, text=True, check=False)
     assert (child.returncode, child.stderr) == (143, "pilotage: ended by SIGTERM\n")
+
+
+COMPILED = """
+import sys
+from pilotage.cli import app
+from pilotage.cli.main import main
+
+sys.argv[1:] = ["missions"]
+app.dispatch = lambda _: exec("import os, signal, time; os.kill(os.getpid(), signal.SIGINT); time.sleep(60)")
+sys.exit(main())
+"""
+
+
+def test_one_that_strikes_in_code_compiled_from_text_has_its_exit_code(tmp_path: Path) -> None:
+    """As libraries make it: ``python -m pilotage`` ended by SIGINT, two of five times as workers started."""
+    (tmp_path / "compiled.py").write_text(COMPILED)
+    child = subprocess.run(
+        [sys.executable, "-m", "compiled"], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert (child.returncode, child.stderr) == (130, "pilotage: interrupted\n")
 
 
 CAST = """

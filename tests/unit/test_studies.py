@@ -200,11 +200,6 @@ def test_a_metric_that_no_trial_gives_is_refused_with_the_nearest(tmp_path: Path
     assert not (tmp_path / "study").exists()
 
 
-def test_a_metric_of_other_missions_is_noticed_once_trials_ran(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="metric 'lost_s': no trial of the study"):
-        run_study(small(metrics=["lost_s"], primary=None, trials=1), tmp_path / "study", ONE)
-
-
 def test_a_corrupt_database_is_said_and_salvaged(undisturbed: Path, tmp_path: Path) -> None:
     import shutil
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import socket
 import sqlite3
@@ -11,6 +12,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -99,6 +101,44 @@ def test_a_broken_database_is_told_in_one_line_and_what_is_left_is_exported(
         for entry in saved[1:]:
             row = dict(zip(header, entry.split(","), strict=True))
             assert float(row["planned_length_m"]) == expected(int(row["row"]))["planned_length_m"]
+
+
+def test_a_row_that_nothing_made_leaves_no_log(finished: Path, tmp_path: Path) -> None:
+    """The error held a cursor on its way, that the database, and that its log until it was collected."""
+    folder = tmp_path / "x"
+    shutil.copytree(finished, folder)
+    with closing(sqlite3.connect(folder / DATABASE)) as database:
+        database.execute("update trials set status = 'x'")
+        database.commit()
+    before = {path.name for path in folder.iterdir()}
+    with pytest.raises(InputError, match="row 0 neither waits nor runs"):
+        run_study(study_of(trials=100), folder, StudyOptions(workers=1, resume=True))
+    assert {path.name for path in folder.iterdir()} - before == {"trials-salvaged.csv"}
+
+
+@pytest.mark.parametrize(
+    ("essence", "told"),
+    [
+        ("1.5", "what its rows were made from is not told"),
+        ("[]", "what its rows were made from is not told"),
+        ("{", "JSON"),
+        ('{"mission": {"plugins": [3, null]}, "files": {}}', "another definition|found them changed"),
+    ],
+)
+def test_rows_that_were_made_from_nothing_are_told_in_one_line(
+    finished: Path, tmp_path: Path, essence: str, told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """``run --from`` and ``--resume`` ended in a traceback."""
+    folder = tmp_path / "x"
+    shutil.copytree(finished, folder)
+    with closing(sqlite3.connect(folder / DATABASE)) as database:
+        database.execute("update meta set value = ? where key = 'essence'", (essence,))
+        database.execute("update meta set value = 'x' where key = 'digest'")
+        database.commit()
+    for words in (["run", "--from", f"{folder}:1"], ["study", str(folder), "--resume", "--no-report"]):
+        assert main([*words, "--quiet"]) == 2
+        (line,) = capsys.readouterr().err.splitlines()
+        assert re.search(told, line)
 
 
 def test_a_definition_with_fewer_settings_than_its_trials_is_told_in_one_line(

@@ -43,6 +43,7 @@ def descendants(pid: int) -> set[int]:
         ((signal.SIGINT,), False, 130, "pilotage: stopped; go on with --resume, what is finished is in "),
         ((signal.SIGINT, signal.SIGINT), True, 130, "pilotage: stopped; go on with --resume, what is"),
         ((signal.SIGTERM,), True, 143, "pilotage: ended by SIGTERM; go on with --resume, what is finished"),
+        ((signal.SIGHUP,), True, 129, "pilotage: ended by SIGHUP; go on with --resume, what is finished"),
         ((signal.SIGKILL,), False, -9, ""),
     ],
 )
@@ -77,7 +78,7 @@ def test_a_signal_ends_it_without_orphans(
     assert rows[4]["status"] == ("running" if code == -9 else "pending")
     if code != -9:
         assert {(row["status"], row["attempts"]) for row in rows} <= {("done", 1), ("pending", 0)}
-    if len(sent) > 1 or sent[0] == signal.SIGTERM:
+    if len(sent) > 1 or sent[0] in {signal.SIGTERM, signal.SIGHUP}:
         return
     order()
     sweep = ["sweep", "museum-plan", "--vary", "stack.planner.turning_radius_m=0.3,0.5,0.8", "--trials", "6"]

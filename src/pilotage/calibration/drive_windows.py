@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -81,7 +82,8 @@ def _minutes(t_s: FloatArray, first_s: float) -> IntArray:
 def _windows(log: MrclamLog, delay_s: float, window_s: float) -> tuple[FloatArray, FloatArray]:
     """Begins (N,) of windows apart from the truth's gaps, and the table (N, 5) of ``DriveRows``."""
     t, truth_t = log.odometry_t_s, log.truth_t_s
-    begin = np.arange(max(t[0], truth_t[0]) + 1.0, min(t[-1], truth_t[-1]) - window_s, window_s)
+    first_s, last_s = max(t[0], truth_t[0]) + 1.0, min(t[-1], truth_t[-1]) - window_s
+    begin = _beside_gaps(first_s, last_s, window_s, log.truth_gaps_s)
     end = begin + window_s
     for left, right in log.truth_gaps_s:
         apart = (end < left) | (begin > right)
@@ -92,7 +94,7 @@ def _windows(log: MrclamLog, delay_s: float, window_s: float) -> tuple[FloatArra
     sums = [np.concatenate([[0.0], np.cumsum(step * rate)]) for rate in rates]
     claimed = [(np.interp(end - delay_s, t, s) - np.interp(begin - delay_s, t, s)) / window_s for s in sums]
     # The true distance along the path, so that arcs count in full; 0.1 s steps keep the tracker's jitter out.
-    clock = np.arange(truth_t[0], truth_t[-1], 0.1)
+    clock = _beside_gaps(truth_t[0], truth_t[-1], 0.1, log.truth_gaps_s)
     x, y = (np.interp(clock, truth_t, log.truth[:, i]) for i in (0, 1))
     unwrapped = np.unwrap(log.truth[:, 2])
     middle = np.interp(clock[:-1] + 0.05, truth_t, unwrapped)
@@ -100,6 +102,18 @@ def _windows(log: MrclamLog, delay_s: float, window_s: float) -> tuple[FloatArra
     moved = (np.interp(end, clock, gone) - np.interp(begin, clock, gone)) / window_s
     turned = (np.interp(end, truth_t, unwrapped) - np.interp(begin, truth_t, unwrapped)) / window_s
     return begin, np.column_stack([*claimed, moved, turned])
+
+
+def _beside_gaps(first_s: float, last_s: float, step_s: float, gaps_s: FloatArray) -> FloatArray:
+    """(N,) the times of ``np.arange`` but those far inside a gap (K, 2), which may be years long."""
+    edges = [first_s, *gaps_s.ravel().tolist(), last_s]
+    pieces = [
+        np.arange(max((left - first_s) // step_s - 1.0, 0.0), (right - first_s) // step_s + 2.0)
+        for left, right in zip(edges[::2], edges[1::2], strict=True)
+    ]
+    steps = np.unique(np.concatenate(pieces))
+    steps = steps[steps < math.ceil((last_s - first_s) / step_s)]
+    return np.asarray(first_s + steps * ((first_s + step_s) - first_s))
 
 
 def _ratios(log: MrclamLog) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -99,8 +99,8 @@ def is_moving(log: HeadingLog) -> bool:
     """Whether it is known to have turned, or means over a second differ by over 0.1 rad/s on any axis."""
     if log.turns:
         return True
-    seconds = np.floor(log.t_s - log.t_s[0]).astype(np.int64)
-    counts = np.bincount(seconds)
+    # Seconds without a reading are not counted: a clock that is put right may leave years of them.
+    _, seconds, counts = np.unique(np.floor(log.t_s - log.t_s[0]), return_inverse=True, return_counts=True)
     full = counts > 0.2 * np.median(counts)
     for axis in range(3):
         means = np.bincount(seconds, log.values[:, axis])[full] / counts[full]

@@ -1,8 +1,8 @@
 """The entry point: run one command, turn what went wrong into one line and an exit code.
 
-Exit codes: 0 done, 1 the task failed in the field, 2 bad input, 130 interrupted, 143 asked to end by
-SIGTERM, 141 the reader of the output went away, 70 a bug (it alone shows our traceback; a plugin's bug is
-bad input and shows the plugin's).
+Exit codes: 0 done, 1 the task failed in the field, 2 bad input, 130 interrupted, 143 and 129 asked to end by
+SIGTERM and SIGHUP, 141 the reader of the output went away, 70 a bug (it alone shows our traceback; a plugin's
+bug is bad input and shows the plugin's).
 """
 
 from __future__ import annotations
@@ -18,9 +18,10 @@ from pathlib import Path
 from types import FrameType
 
 from pilotage.core.interruptions import (
-    INTERRUPTED,
-    TERMINATED,
+    ENDING,
+    STRUCK,
     Terminated,
+    ended_by,
     interruption_in,
     never_swallowed,
 )
@@ -53,11 +54,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with _ended_once(for_good=arguments is None) as struck:
             return _run(sys.argv[1:] if arguments is None else list(arguments), struck)
     except KeyboardInterrupt as stop:
+        # One that struck in code compiled from text, as libraries make it, has `python -m pilotage` end by
+        # SIGINT, whatever the exit code: other code from text takes that back.
+        exec("")
         if arguments is None:
             # The process ends: of objects left half made, whose destructors fail, there is nothing to tell.
             sys.unraisablehook = lambda _: None
-        ended = isinstance(stop, Terminated)
-        return _say("ended by SIGTERM", TERMINATED) if ended else _say("interrupted", INTERRUPTED)
+        return _say(*ended_by(stop))
     except MemoryError:
         # Where even to tell of a fault there was none.
         return _without_memory()
@@ -69,7 +72,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 @contextmanager
 def _ended_once(for_good: bool) -> Iterator[list[KeyboardInterrupt]]:
-    """Let SIGTERM unwind as Ctrl-C does, and neither of them twice; what struck, if anything did, is yielded.
+    """Let SIGTERM and SIGHUP unwind as Ctrl-C does, and none of them twice; what struck is yielded.
 
     A second one must not cut the clearing away short, nor the interpreter's own end where the process ends
     with the command (``for_good``). Only a process's main thread can ask for that.
@@ -82,11 +85,11 @@ def _ended_once(for_good: bool) -> Iterator[list[KeyboardInterrupt]]:
     def end(signum: int, frame: FrameType | None) -> None:
         for number in before:
             signal.signal(number, signal.SIG_IGN)
-        struck.append(Terminated() if signum == signal.SIGTERM else KeyboardInterrupt())
+        struck.append(KeyboardInterrupt() if signum == signal.SIGINT else Terminated(signum))
         raise_in(struck[0], frame)
 
-    before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGINT)}
-    # Where Ctrl-C is ignored from the start (a shell's background job), it stays so.
+    before = {number: signal.getsignal(number) for number in ENDING}
+    # What is ignored from the start stays so: Ctrl-C by a shell's background job, SIGHUP by nohup.
     caught = [number for number in before if before[number] is not signal.SIG_IGN]
     with never_swallowed() as raise_in:
         try:
@@ -137,6 +140,8 @@ def _run(arguments: list[str], struck: list[KeyboardInterrupt]) -> int:
     try:
         code = dispatch(arguments)
         sys.stdout.flush()
+        if struck and code < STRUCK:  # it has ended what was to go on, and told of it
+            raise struck[0]
         return code
     except BrokenPipeError:
         raise

@@ -10,8 +10,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
 
-INTERRUPTED, TERMINATED = 130, 143
-"""Exit codes of a process that Ctrl-C or SIGTERM ended."""
+STRUCK = 128
+"""The exit code of a process that a signal ended is its number beyond this."""
+ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
+"""What asks a process to end: Ctrl-C, a supervisor, a terminal that is gone."""
 _SOON_S = 0.01
 _UNGUARDED = tuple(
     str(Path(*names))
@@ -27,7 +29,18 @@ the types of what they return. NumPy takes fields that are being compared for fi
 
 
 class Terminated(KeyboardInterrupt):
-    """SIGTERM, raised where Ctrl-C would be, so that what is half-written is cleared away."""
+    """SIGTERM or SIGHUP, raised where Ctrl-C would be, so that what is half-written is cleared away."""
+
+    def __init__(self, number: int = signal.SIGTERM) -> None:
+        super().__init__()
+        self.number = number
+
+
+def ended_by(stop: KeyboardInterrupt) -> tuple[str, int]:
+    """What is said of a process that an interruption ended, and its exit code."""
+    if isinstance(stop, Terminated):
+        return f"ended by {signal.Signals(stop.number).name}", STRUCK + stop.number
+    return "interrupted", STRUCK + signal.SIGINT
 
 
 def interruption_in(error: BaseException) -> KeyboardInterrupt | None:

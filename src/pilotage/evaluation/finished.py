@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from pilotage.core.types import Event, FloatArray, Pose2
 from pilotage.maps.world_map import WorldMap
@@ -115,8 +115,11 @@ class Verdict:
         One mapping a robot: what was worked out for every row of its trace, such as the NEES.
     extras
         Arrays that a report shows, by name, such as the shortest path.
+    lacking
+        Metrics that ask for a column that no robot's trace has, with that column.
     """
 
     metrics: dict[str, object]
     columns: tuple[Mapping[str, FloatArray], ...]
     extras: Mapping[str, FloatArray]
+    lacking: Mapping[str, str] = field(default_factory=dict)

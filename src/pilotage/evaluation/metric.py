@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+from fnmatch import filter as matching
 
 from pilotage.core.errors import InputError
 from pilotage.core.misfit import told
@@ -83,6 +84,10 @@ class Metric:
         The tasks whose runs give it; empty: all of them.
     needs
         What else a mission must have for its runs to give it, such as ``planner`` or ``estimate``.
+    columns
+        Columns of the trace without which no run gives it; ``*`` stands for any letters.
+    sometimes
+        It tells of what need not happen: trials that all went well may do without it.
     ideal
         What a metric without a direction should be; nan where there is no such value.
     group
@@ -102,6 +107,8 @@ class Metric:
     whole_runs: bool = False
     tasks: frozenset[str] = frozenset()
     needs: frozenset[str] = frozenset()
+    columns: frozenset[str] = frozenset()
+    sometimes: bool = False
     ideal: float = float("nan")
     group: str = "Further"
     compute: Compute | None = None
@@ -129,6 +136,10 @@ class Metric:
     def less_is_better(self) -> bool | None:
         """Whether less of it is better; None where neither is, or nobody knows."""
         return None if self.direction is Direction.NONE else self.direction is Direction.LESS
+
+    def is_told_by(self, columns: Iterable[str]) -> bool:
+        """Whether a trace of these columns has all that it needs."""
+        return all(matching(columns, pattern) for pattern in self.columns)
 
     def is_given_by(self, task: str, has: frozenset[str] | None = None) -> bool:
         """Whether runs of a task can give it; ``has`` is what the mission has (None: everything)."""

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from pilotage.evaluation.finished import Verdict
@@ -22,11 +23,15 @@ from pilotage.records.run_folder import write_run
 
 @dataclass(frozen=True, slots=True)
 class RunResult:
-    """What came out: the metrics, whether the task succeeded, and where the evidence is."""
+    """What came out: the metrics, whether the task succeeded, and where the evidence is.
+
+    ``lacking`` as a verdict has it.
+    """
 
     metrics: dict[str, object]
     success: bool
     run_dir: Path | None
+    lacking: Mapping[str, str]
 
 
 def run_mission(
@@ -65,12 +70,11 @@ def run_mission(
         folder = Path("runs") if out is None else out
         run_dir = write_run(folder, run_name(run.finished.mission), files_of(run, verdict, metrics))
         metrics["run_dir"] = str(run_dir)
-    return RunResult(metrics, bool(metrics["success"]), run_dir)
+    return RunResult(metrics, bool(metrics["success"]), run_dir, verdict.lacking)
 
 
 def judge(experiment: Experiment, run: Run) -> Verdict:
     """The task's verdict, with the metrics that were registered from outside."""
     verdict = told_why(experiment.task.judge(run.finished), run.finished)
     verdict.metrics["success"] = bool(verdict.metrics["success"])
-    add_computed(verdict.metrics, run.finished)
-    return verdict
+    return replace(verdict, lacking=add_computed(verdict.metrics, run.finished))

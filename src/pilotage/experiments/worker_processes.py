@@ -13,6 +13,11 @@ from multiprocessing import resource_tracker
 from multiprocessing.connection import wait
 from multiprocessing.context import SpawnContext
 
+from pilotage.core.interruptions import ENDING
+
+TO_GROUP = frozenset(ENDING) - {signal.SIGTERM}
+"""What a terminal sends to a process with all its workers."""
+
 
 def context() -> SpawnContext:
     """How they are started: spawned, as a fork would take the parent's threads and numba's locks along."""
@@ -21,12 +26,12 @@ def context() -> SpawnContext:
 
 @contextlib.contextmanager
 def interrupts_held() -> Iterator[None]:
-    """Keep Ctrl-C waiting while a worker starts, which inherits that and so never sees one."""
+    """Keep Ctrl-C and SIGHUP waiting while a worker starts, which inherits that and so never sees one."""
     if not hasattr(signal, "pthread_sigmask"):  # pragma: no cover - Windows
         yield
         return
     resource_tracker.ensure_running()  # a process of its own, which undoes the hold when it starts
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, TO_GROUP)
     try:
         yield
     finally:
@@ -34,15 +39,16 @@ def interrupts_held() -> Iterator[None]:
 
 
 def obey_the_parent() -> None:
-    """Leave Ctrl-C, which goes to the whole group, to the parent, and end when that is gone.
+    """Leave what goes to the whole group to the parent, and end when that is gone.
 
     Standard output is the parent's as well, maybe for one JSON object alone: what is printed goes to standard
     error.
     """
     sys.stdout = sys.stderr
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for number in TO_GROUP:
+        signal.signal(number, signal.SIG_IGN)
     if hasattr(signal, "pthread_sigmask"):
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, TO_GROUP)
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 

@@ -18,11 +18,12 @@ from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray, IntArray, Pose2
 from pilotage.logs.scanner_mount import LARGEST
 from pilotage.logs.stamps import apart, between_readings, increasing, keeps_order
+from pilotage.sensors.lidar import LEAST_STEP_RAD
 
 SCANNER_STEPS_DEG, STEP_ERROR = (1.0, 0.5, 1.0 / 3.0, 0.25), 1e-4
 """Angles between beams that planar scanners are built with, and the share a told one may be off from one."""
-LEAST_STEP_RAD, MOST_VIEW_RAD, MOST_FIRST_RAD = 1e-6, 4.0 * math.pi, 4.0 * math.pi
-"""Beyond these beams lie on one another, or their angles are degrees or no angles."""
+MOST_VIEW_RAD, MOST_FIRST_RAD = 4.0 * math.pi, 4.0 * math.pi
+"""Beyond these the beams' angles are degrees or no angles."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -251,13 +252,21 @@ def _without_the_last_post(step_rad: FloatArray, beams: IntArray, said: list[str
     return true_rad
 
 
+def are_beams(first_angle_rad: float, angle_step_rad: float, beams: int) -> bool:
+    """Whether a scanner can look so; NaN is in no range."""
+    apart = beams == 1 or abs(angle_step_rad) >= LEAST_STEP_RAD
+    return (
+        apart
+        and abs(first_angle_rad) <= MOST_FIRST_RAD
+        and abs(angle_step_rad) * (beams - 1) <= MOST_VIEW_RAD
+    )
+
+
 def _is_usable(scan: RawScan) -> bool:
     """Whether a scanner could have made it; NaN is in no range, a limit of infinity is one."""
-    view_rad = abs(scan.angle_step_rad) * (scan.ranges_m.size - 1)
-    apart = scan.ranges_m.size == 1 or abs(scan.angle_step_rad) >= LEAST_STEP_RAD
-    turns = abs(scan.first_angle_rad) <= MOST_FIRST_RAD and view_rad <= MOST_VIEW_RAD
     reaches = scan.range_max_m > max(scan.range_min_m, 0.0)
-    return math.isfinite(scan.t_s) and apart and turns and reaches
+    looks = are_beams(scan.first_angle_rad, scan.angle_step_rad, scan.ranges_m.size)
+    return math.isfinite(scan.t_s) and looks and reaches
 
 
 def _in_three_kinds(ranges_m: FloatArray, least: float, most: float) -> FloatArray:

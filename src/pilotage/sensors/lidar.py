@@ -13,6 +13,8 @@ from pilotage.sensors.sensor import SENSORS, NonNegative, Reach, SensorConfig
 
 SURE_SHARE = 0.995
 """Of a scanner's reach."""
+LEAST_STEP_RAD = 1e-6
+"""Beams nearer to each other lie on one another."""
 
 
 @SENSORS.add_config("lidar")
@@ -55,9 +57,10 @@ class LidarConfig(SensorConfig):
         out = np.full(self.beams, np.nan)
         if not len(ranges_m):
             return out
-        steps = (self.beam_angles_rad() - first_angle_rad) / (step_rad or 1.0)
+        between_rad = step_rad if abs(step_rad) >= LEAST_STEP_RAD else 1.0  # one beam has none
+        steps = (self.beam_angles_rad() - first_angle_rad) / between_rad
         # Directions a full turn apart are one: a scanner may count from 0 to 2 pi, or look back.
-        a_turn = 2.0 * math.pi / abs(step_rad or 1.0)
+        a_turn = 2.0 * math.pi / abs(between_rad)
         beside = (steps < -0.5) | (steps > len(ranges_m) - 0.5)
         steps[beside] -= a_turn * np.floor((steps[beside] + 0.5) / a_turn)
         nearest = np.rint(steps).astype(np.int64)

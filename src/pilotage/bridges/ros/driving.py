@@ -15,6 +15,9 @@ from pilotage.core.errors import InputError
 from pilotage.core.files.arrays import quiet
 from pilotage.core.types import STOP, FloatArray, Pose2, Twist
 from pilotage.experiments.build.build import build
+from pilotage.logs.bags import heading_of
+from pilotage.logs.laser_log import are_beams
+from pilotage.logs.scanner_mount import LARGEST
 from pilotage.missions.mission import Mission
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, OdometryIncrement, Reading, Readings
@@ -31,6 +34,12 @@ class LiveReadings:
     """Readings of one robot, step by step, from ``/odom`` and ``/scan``.
 
     A step is due when odometry has gone on by the mission's ``dt_s``; the times are those of the messages.
+
+    Attributes
+    ----------
+    refused
+        Messages by topic that say nothing: a pose that is none, or not later than the last; beams that no
+        scanner has. A robot that drove by them would be nowhere for good.
     """
 
     def __init__(self, node: Any, lidar: tuple[str, LidarConfig] | None, odometry: str, dt_s: float) -> None:
@@ -40,18 +49,26 @@ class LiveReadings:
         self._used: tuple[float, Pose2] | None = None
         self._used_scan_s = self._began_s = -math.inf
         self._patience_s = time.perf_counter() + FIRST_S
+        self.refused = {"/odom": 0} | ({} if lidar is None else {"/scan": 0})
         node.listens("/odom", ros.ODOMETRY, self._hear_odometry)
         if lidar is not None:
             node.listens("/scan", ros.SCAN, self._hear_scan)
 
     def _hear_odometry(self, message: Any) -> None:
-        at, turn = message.pose.pose.position, message.pose.pose.orientation
-        theta = math.atan2(2.0 * (turn.w * turn.z + turn.x * turn.y), 1.0 - 2.0 * (turn.y**2 + turn.z**2))
-        self._pose = _seconds(message), Pose2(at.x, at.y, theta)
+        at, t_s = message.pose.pose.position, _seconds(message)
+        theta = heading_of(message.pose.pose.orientation)
+        later = self._pose is None or t_s > self._pose[0]
+        if not (later and abs(at.x) <= LARGEST and abs(at.y) <= LARGEST and math.isfinite(theta)):
+            self.refused["/odom"] += 1
+            return
+        self._pose = t_s, Pose2(at.x, at.y, theta)
         self._patience_s = time.perf_counter() + SILENT_S
 
     def _hear_scan(self, message: Any) -> None:
-        self._scan = _seconds(message), message
+        if are_beams(message.angle_min, message.angle_increment, len(message.ranges)):
+            self._scan = _seconds(message), message
+        else:
+            self.refused["/scan"] += 1
 
     def next(self) -> Readings | None:
         """The readings of the next step; None where nothing is heard any more."""
@@ -136,6 +153,7 @@ def drive(mission: Mission, duration_s: float | None = None) -> dict[str, Any]:
             "duration_s": t_s,
             "sent": node.sent,
             "received": node.received,
+            "refused": source.refused,
             "believed": {"x_m": pose.x_m, "y_m": pose.y_m, "theta_rad": pose.theta_rad},
         }
 

@@ -9,6 +9,7 @@ from typing import Any
 from pilotage.bridges.ros import messages as ros
 from pilotage.bridges.ros.node import FLUSH_S, ros_node
 from pilotage.core.errors import InputError
+from pilotage.core.misfit import unfit_number
 from pilotage.core.types import STOP, Pose2, Twist
 from pilotage.experiments.build.robots import sensors_of
 from pilotage.face.stepping import make
@@ -51,7 +52,7 @@ def serve(mission: Mission, speed: float = 1.0, duration_s: float | None = None)
     lidar, sheet = next(((n, s) for n, s in sheets.items() if isinstance(s, LidarConfig)), ("", None))
     sim, dt_s = make(mission), mission.run.dt_s
     heard: list[tuple[float, Twist]] = [(-math.inf, STOP)]
-    late = steps = 0
+    late = steps = refused = 0
     with ros_node("pilotage") as node:
         topics = {"/clock": ros.CLOCK, "/odom": ros.ODOMETRY, "/tf": ros.TRANSFORMS}
         if sheet is not None:
@@ -59,7 +60,11 @@ def serve(mission: Mission, speed: float = 1.0, duration_s: float | None = None)
         silent = [topic for topic, msgtype in topics.items() if not node.publishes(topic, msgtype)]
 
         def hear(message: Any) -> None:
-            heard[0] = steps * dt_s, Twist(message.linear.x, message.angular.z, message.linear.y)
+            nonlocal refused
+            asked = message.linear.x, message.angular.z, message.linear.y
+            fits = not any(map(unfit_number, asked))
+            refused += not fits
+            heard[0] = steps * dt_s, Twist(*asked) if fits else STOP
 
         node.listens("/cmd_vel", ros.TWIST, hear)
         readings, reckoned = sim.reset(), Pose2(0.0, 0.0, 0.0)
@@ -92,7 +97,7 @@ def serve(mission: Mission, speed: float = 1.0, duration_s: float | None = None)
                 readings = sim.step(command if t_s - at_s <= HELD_S else STOP)
             node.spin_until(time.perf_counter() + FLUSH_S)
         except KeyboardInterrupt:
-            pass  # how a server without a duration ends
+            pass  # how a server without a duration ends: it tells what it did
         return {
             "mission": mission.mission,
             "speed": speed,
@@ -102,6 +107,7 @@ def serve(mission: Mission, speed: float = 1.0, duration_s: float | None = None)
             "sent": node.sent,
             "silent": {topic: f"{topics[topic].split('/')[0]} is not installed" for topic in silent},
             "received": node.received,
+            "refused": {"/cmd_vel": refused},
             "collisions": sim.collisions[0],
             "end": {"x_m": sim.poses[0].x_m, "y_m": sim.poses[0].y_m, "theta_rad": sim.poses[0].theta_rad},
         }

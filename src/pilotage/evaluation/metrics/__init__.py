@@ -23,6 +23,7 @@ costs_of = METRICS.costs_of
         meaning="Whether the body touched anything at all; over trials, the share that did.",
         direction=Direction.LESS,
         aspect=Aspect.SAFETY,
+        needs=frozenset({"driven"}),
         group="",
     )
 )

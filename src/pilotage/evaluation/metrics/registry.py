@@ -102,10 +102,14 @@ class Metrics:
         return self.find(key).clock is Clock.WALL
 
     def computed(
-        self, task: str, trace: Mapping[str, FloatArray], metrics: Mapping[str, object]
+        self,
+        task: str,
+        trace: Mapping[str, FloatArray],
+        metrics: Mapping[str, object],
+        lacking: dict[str, str] | None = None,
     ) -> dict[str, object]:
         """What the declared functions give for a run; left out what gives None, or asks for a column that the
-        run has not.
+        run has not, which is put into ``lacking`` by the metric's key.
 
         Raises
         ------
@@ -119,7 +123,9 @@ class Metrics:
                 continue
             try:
                 value = metric.compute(trace, metrics)
-            except NoColumnError:
+            except NoColumnError as error:
+                if lacking is not None:
+                    lacking[metric.key] = error.args[0]
                 continue
             if value is None:
                 continue

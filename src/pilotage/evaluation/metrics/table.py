@@ -53,6 +53,8 @@ def shipped_metrics() -> Iterator[Metric]:
             whole_runs=row["whole_runs"] == "yes",
             tasks=frozenset(row["tasks"].split()),
             needs=frozenset(row["needs"].split()),
+            columns=frozenset(row["columns"].split()),
+            sometimes=row["sometimes"] == "yes",
             ideal=float(row["ideal"] or math.nan),
             group=row["group"],
         )

@@ -44,6 +44,7 @@ from pilotage.logs.trajectories import read_tum
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.beacon import BeaconConfig
 from pilotage.sensors.lidar import LidarConfig
+from pilotage.sensors.numbers import FARTHEST_M
 from pilotage.sensors.sensor import Mount, SensorConfig
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 
@@ -166,9 +167,16 @@ def bag_drive(
     rows, first = np.zeros((0, 4)), np.zeros(len(clock) + 1, dtype=np.int64)
     if seen is not None:
         inside = (seen.t_s > begin) & (seen.t_s <= end) & np.isin(seen.values[:, 0], chart.landmarks.ids)
+        away_m = np.hypot(seen.values[:, 1], seen.values[:, 2])
+        near = SPARE * away_m <= FARTHEST_M
+        if (inside & ~near).any():
+            said.append(
+                f"{np.count_nonzero(inside & ~near)} landmarks farther than any sensor sees were left out"
+            )
+        inside &= near
         rows = seen.values[inside]
         first = np.searchsorted(seen.t_s[inside], np.append(clock, np.inf)).astype(np.int64)
-        reach = float(np.hypot(rows[:, 1], rows[:, 2]).max(initial=1.0))
+        reach = float(away_m[inside].max(initial=1.0))
         sensors[BEACONS] = BeaconConfig(
             max_range_m=SPARE * reach, range_var_m2=BEACON_VAR_M2, bearing_var_rad2=BEACON_VAR_RAD2
         )

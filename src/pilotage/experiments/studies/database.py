@@ -12,9 +12,11 @@ import zlib
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 from pilotage.core.errors import InputError, PilotageError
 from pilotage.core.files import require_file
+from pilotage.core.json_text import load_json
 
 DATABASE = "trials.sqlite"
 BUSY_S = 60.0
@@ -219,6 +221,20 @@ def is_full(error: sqlite3.DatabaseError) -> bool:
 def checksum(row: int, cell: int, seed: int, metrics: str | None, timings: str | None) -> int:
     """CRC-32 over what a finished row says: SQLite itself does not notice a changed digit."""
     return zlib.crc32(f"{row}|{cell}|{seed}|{metrics}|{timings}".encode())
+
+
+def essence_told(text: str, path: Path) -> dict[str, Any]:
+    """What a database says that its rows were made from.
+
+    Raises
+    ------
+    InputError
+        Where that is no such thing.
+    """
+    found = load_json(text, str(path))
+    if not isinstance(found, dict):
+        raise CorruptDatabaseError(path, "what its rows were made from is not told")
+    return found
 
 
 def _reading_only(path: Path) -> sqlite3.Connection:

@@ -8,16 +8,15 @@ import shutil
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence, Set
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from pilotage.core.errors import InputError, nearest
+from pilotage.core.errors import InputError
 from pilotage.core.whole_file import write_whole
-from pilotage.evaluation.metrics import METRICS
 from pilotage.experiments.build.build import build_source
-from pilotage.experiments.given import has
 from pilotage.experiments.mission import mission_of
+from pilotage.experiments.studies.asked import Asked
 from pilotage.experiments.studies.dask_workers import DaskWorkers
 from pilotage.experiments.studies.database import (
     DATABASE,
@@ -29,7 +28,6 @@ from pilotage.experiments.studies.database import (
 from pilotage.experiments.studies.export import save_what_is_left
 from pilotage.experiments.studies.local_workers import LocalWorkers
 from pilotage.experiments.studies.options import StudyOptions, cores
-from pilotage.experiments.studies.rows import flat, read_rows
 from pilotage.experiments.studies.store import Counts, Store
 from pilotage.experiments.studies.study import (
     MISSION_FILE,
@@ -45,8 +43,6 @@ HEAR_EVERY_S = 5.0
 TELL_EVERY_S = 0.1
 QUIET_S = 10.0
 """For so long nothing is told of a study of which no trial has shown yet that it can be."""
-ENOUGH_TO_TELL = 20
-"""A metric that none of so many trials gives is given by none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,25 +79,28 @@ def run_study(
     ------
     InputError
         Of no cell anything can be built (nothing is left behind then);
-        a metric that no mission of the study's tasks gives (nothing is run or written then), or that no
-        trial gives; the folder holds another definition, was begun and ``resume`` is not said, or was not
-        and it is; a corrupt database, after what can be read of it was saved.
+        a metric that no mission of the study's tasks gives, or no component tells what it is made from
+        (nothing is run or written then), or that no trial gives; the folder holds another definition, was
+        begun and ``resume`` is not said, or was not and it is; a corrupt database, after what can be read of
+        it was saved.
     StudyStoppedError
         The disk is full and stays so, the cluster is gone, or no worker can begin.
     KeyboardInterrupt
         Passed on, with all finished rows written and the claims given back.
     """
     options, listener = options or StudyOptions(), listener or Listener()
-    check_asked(study)
+    asked = Asked(study)
+    asked.check_tasks()
     if options.resume and not folder.is_dir():
         raise InputError(f"{folder}: expected a study that was begun, found none; leave --resume out")
     if not (folder / DATABASE).is_file():
         check_worlds(study)
+        asked.check_columns()
     had_log = has_log(folder / DATABASE)
     made = [place for place in (folder, *folder.parents) if not place.exists()]
     try:
         try:
-            counts = _run(study, folder, options, listener)
+            counts = _run(study, folder, options, listener, asked)
         except NothingBuiltError:  # nothing is left of what cannot be
             if made:
                 shutil.rmtree(folder, ignore_errors=True)
@@ -109,7 +108,7 @@ def run_study(
                 with contextlib.suppress(OSError):  # somebody else has put something there
                     parent.rmdir()
             raise
-        check_metrics(study, folder)
+        asked.check_rows(folder / DATABASE)
     except CorruptDatabaseError as error:
         saved = save_what_is_left(folder, study, error.trouble)
         if not had_log:
@@ -145,7 +144,7 @@ def check_worlds(study: Study) -> None:
             raise InputError(f"cell '{cell.name}': {error}") from None
 
 
-def _run(study: Study, folder: Path, options: StudyOptions, listener: Listener) -> Counts:
+def _run(study: Study, folder: Path, options: StudyOptions, listener: Listener, asked: Asked) -> Counts:
     with contextlib.ExitStack() as stack:
         # Before a folder is made: nothing is left behind where nobody answers.
         crew: Workers | None = None
@@ -173,18 +172,17 @@ def _run(study: Study, folder: Path, options: StudyOptions, listener: Listener) 
                 crew = LocalWorkers(study.base, count, options.trial_timeout_s, memory)
                 stack.callback(_put_away, crew.stop)
             fresh = not begun and not store.others()
-            _loop(study, store, crew, folder, listener, fresh=fresh)
+            _loop(study, store, crew, asked, listener, fresh=fresh)
         return store.counts()
 
 
 def _loop(
-    study: Study, store: Store, crew: Workers, folder: Path, listener: Listener, *, fresh: bool
+    study: Study, store: Store, crew: Workers, asked: Asked, listener: Listener, *, fresh: bool
 ) -> None:
     began = heard = time.monotonic()
     shown, finished = 0.0, 0
     held: dict[int, int] = {}  # rows under way, and their cells
     unbuilt = Unbuilt(study, listener.trouble, fresh=fresh)
-    checked = False
     while True:
         room = crew.room
         for task in store.claim(room) if room else ():
@@ -204,13 +202,11 @@ def _loop(
             then = "tried once more" if again else "given up"
             told = f"row {outcome.row}: {outcome.reason}; {then}" if outcome.reason else ""
             unbuilt.hear(cell, outcome, told)
+            asked.hear(cell, outcome, store.path)
         now = time.monotonic()
         if now - heard > HEAR_EVERY_S:
             store.hear()
             heard = now
-        if not checked and finished >= ENOUGH_TO_TELL:
-            check_metrics(study, folder)
-            checked = True
         if now - shown > TELL_EVERY_S and not (unbuilt.asks and now - began < QUIET_S):
             counts = store.counts()
             rate = finished / max(now - began, 1e-9)
@@ -236,70 +232,6 @@ def _undisturbed() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, before)
-
-
-def check_asked(study: Study) -> None:
-    """Refuse a metric that no trial of the study can give.
-
-    Raises
-    ------
-    InputError
-        With the nearest one that they can give.
-    """
-    definition = study.definition
-    told = [*(name for entry in definition.published for name in entry.metrics), *definition.reference]
-    asked = {*_asked(study), *told}
-    known: set[str] = set()
-    tasks: set[str] = set()
-    settled: set[str] = set()
-    for cell in study.cells:
-        if asked <= known:
-            return
-        mission = mission_of(dict(study.base), cell.overrides)
-        settled |= METRICS.given_by(mission.task.name, has(mission) | {"settled"})
-        tasks.add(mission.task.name)
-        known |= METRICS.given_by(mission.task.name, has(mission))
-    _refuse(sorted(asked), known, f"no mission of the task {' or '.join(sorted(tasks))} gives it", settled)
-
-
-def _asked(study: Study) -> list[str]:
-    """The metrics that a study is to report."""
-    definition = study.definition
-    primary = [] if definition.primary is None else [definition.primary]
-    return [*definition.metrics, *primary, *(m for e in definition.contrasts for m in (e.metric, e.against))]
-
-
-def check_metrics(study: Study, folder: Path) -> None:
-    """Refuse a metric that none of the finished trials gives.
-
-    Raises
-    ------
-    InputError
-        With the nearest one that they do give.
-    """
-    rows, trouble = read_rows(folder / DATABASE)
-    if trouble:
-        raise CorruptDatabaseError(folder / DATABASE, trouble)
-    given: set[str] = set()
-    for row in rows:
-        given |= flat(row["metrics"]).keys() | flat(row["timings"]).keys()
-    if not given:
-        return
-    _refuse(_asked(study), given, f"no trial of the study '{study.name}' gives it")
-
-
-def _refuse(asked: Sequence[str], given: set[str], why: str, longer: Set[str] = frozenset()) -> None:
-    """Refuse a metric that is not given; those in ``longer`` would be by longer runs."""
-    for metric in asked:
-        if metric not in given:
-            if metric in longer:
-                raise InputError(
-                    f"metric '{metric}': expected a run.time_limit_s above run.settle_s, after which errors "
-                    "count, found runs that end within it"
-                )
-            close = nearest(metric, sorted(given))
-            hint = f"; did you mean '{close}'?" if close else ""
-            raise InputError(f"metric '{metric}': {why}{hint}")
 
 
 def _write(path: Path, text: str) -> None:

@@ -16,6 +16,7 @@ from pilotage.experiments.studies.database import (
     LONGEST,
     checksum,
     drop_log,
+    essence_told,
     foreign_tables,
     has_log,
 )
@@ -94,10 +95,9 @@ def read_essence(path: Path) -> dict[str, Any] | None:
     try:
         with reader(path) as database:
             (text,) = database.execute("select value from meta where key = 'essence'").fetchone()
-            found: dict[str, Any] = load_json(text, str(path))
     except DAMAGED:
         return None
-    return found
+    return essence_told(text, path)
 
 
 def flat(metrics: Mapping[str, Any]) -> dict[str, float]:

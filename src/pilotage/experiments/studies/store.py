@@ -12,14 +12,13 @@ import sqlite3
 import time
 import uuid
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
 from pilotage.core.errors import InputError
 from pilotage.core.files import require_file
-from pilotage.core.json_text import load_json
 from pilotage.experiments.studies.database import (
     DATABASE,
     SCHEMA,
@@ -28,6 +27,7 @@ from pilotage.experiments.studies.database import (
     checksum,
     close_gently,
     connect,
+    essence_told,
     foreign_tables,
     is_full,
     put_in_place,
@@ -237,7 +237,7 @@ class Store:
         found = dict(self._db.execute("select key, value from meta").fetchall())
         if found.get("digest") == study.digest:
             return
-        made_from = load_json(found.get("essence", "{}"), str(self.path))
+        made_from = essence_told(found.get("essence", "{}"), self.path)
         if is_made_from(study, made_from):
             return
         raise InputError(
@@ -251,15 +251,18 @@ class Store:
         (count,) = self._db.execute("select count(*) from trials").fetchone()
         if count != study.rows:
             raise CorruptDatabaseError(self.path, f"{count} of {study.rows} rows are there")
-        unfinished = self._db.execute(
-            "select row, status, attempts, cell, trial, seed from trials "
-            "where status not in ('done', 'failed')"
-        )
-        for row, status, attempts, *made in unfinished:
-            if status not in ("pending", "running") or not isinstance(attempts, int):
-                raise CorruptDatabaseError(self.path, f"row {row} neither waits nor runs nor is finished")
-            if not 0 <= row < study.rows or made != [*study.place(row), study.seed(row)]:
-                raise CorruptDatabaseError(self.path, f"row {row} is not what was written")
+        # Closed in any case: the error holds this frame, a cursor on its way the database, and that its log.
+        with closing(
+            self._db.execute(
+                "select row, status, attempts, cell, trial, seed from trials "
+                "where status not in ('done', 'failed')"
+            )
+        ) as unfinished:
+            for row, status, attempts, *made in unfinished:
+                if status not in ("pending", "running") or not isinstance(attempts, int):
+                    raise CorruptDatabaseError(self.path, f"row {row} neither waits nor runs nor is finished")
+                if not 0 <= row < study.rows or made != [*study.place(row), study.seed(row)]:
+                    raise CorruptDatabaseError(self.path, f"row {row} is not what was written")
 
     def _hear(self) -> None:
         hear(self._db, self._owner)

@@ -286,6 +286,8 @@ def _by_names(essence: Mapping[str, Any]) -> Mapping[str, Any]:
     plugins = mission.get("plugins") if isinstance(mission, Mapping) else None
     if not isinstance(mission, Mapping) or not isinstance(files, Mapping) or not isinstance(plugins, list):
         return essence
+    if not all(isinstance(name, str) for name in plugins):
+        return essence
     paths = dict.fromkeys(str(Path(name).resolve()) for name in plugins if not is_package(name))
     count = Counter(Path(path).name for path in paths)
     named = {path: Path(path).name for path in paths if count[Path(path).name] == 1}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from pilotage.core.errors import InputError
@@ -42,6 +42,8 @@ class Outcome:
         Whether another try may do better: anything but a mission that cannot be built.
     seconds
         Wall time of the trial itself.
+    lacking
+        Metrics that ask for a column that its trace has not, with that column.
     """
 
     row: int
@@ -50,6 +52,7 @@ class Outcome:
     reason: str = ""
     retry: bool = False
     seconds: float = math.nan
+    lacking: Mapping[str, str] = field(default_factory=dict)
 
 
 class TrialRunner:
@@ -91,10 +94,11 @@ class TrialRunner:
 
 def measured(row: int, mission: Mission) -> Outcome:
     """Run a mission without saving it, its metrics parted into those that repeat and those that do not."""
-    metrics = clean(dict(run_mission(mission, save=False).metrics))
+    result = run_mission(mission, save=False)
+    metrics = clean(dict(result.metrics))
     timings = {key: value for key, value in metrics.items() if METRICS.is_wall_clock(key)}
     kept = {key: value for key, value in metrics.items() if key not in timings and key not in PLACES}
-    return Outcome(row, kept, timings, seconds=metrics["wall_time_s"])
+    return Outcome(row, kept, timings, seconds=metrics["wall_time_s"], lacking=result.lacking)
 
 
 def _said(error: BaseException) -> str:
