@@ -34,6 +34,10 @@ if os.environ.pop("PYTHONDONTWRITEBYTECODE", "") and "PYTHONPYCACHEPREFIX" not i
 # A shell's background job ignores Ctrl-C, and so would all that tests start; those of Ctrl-C need it heard.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
+# All that nohup starts ignores SIGHUP. A handler keeps these processes alive, and is not inherited.
+if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
+    signal.signal(signal.SIGHUP, lambda *_: None)
+
 # With thousands of tests in memory, looking for garbage as often as Python does takes a tenth of the time.
 gc.set_threshold(50_000, 20, 20)
 
