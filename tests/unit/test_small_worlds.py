@@ -79,7 +79,7 @@ def test_a_floor_of_discs_alone_is_known_by_laser() -> None:
     assert run.success, run.reason
     assert run.metrics["position_rmse_m"] < 0.02
     with pytest.raises(
-        InputError, match=r"ekf-walls: expected straight walls .* particle-filter among discs"
+        InputError, match=r"ekf-walls: expected walls that are straight .* particle-filter among discs"
     ):
         pl.run(fenced("local", "ekf-walls", "reach", {"x_m": 4.4, "y_m": 2.0}), save=False, progress=False)
 

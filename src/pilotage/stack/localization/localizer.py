@@ -114,10 +114,12 @@ def require_walls(chart: WorldMap, name: str) -> None:
     InputError
         If no beam can end at a line that is on the map: the filter would dead-reckon for ever.
     """
-    if not len(chart.reflectors.segments_m):
+    walls = chart.reflectors
+    if not len(walls.segments_m):
+        among = ", or take localizer particle-filter among discs" if len(walls.circles_m) else ""
         raise InputError(
-            f"{name}: expected straight walls on the robot's map, found none that a beam ends at on "
-            f"'{chart.name}'; see stack.map, or take localizer particle-filter among discs or cells"
+            f"{name}: expected walls that are straight on the robot's map, found none that a beam ends at on "
+            f"'{chart.name}'; see stack.map{among}"
         )
 
 
