@@ -20,7 +20,7 @@ PROMPT = Driving(
     visit_m=0.0,
     turn_m=0.0,
     meeting_m=0.0,
-    late_m=0.0,
+    leg_spread_m=0.0,
     slack=0.5,
     most_slack=0.1,
     beside_m=0.5,
@@ -71,7 +71,7 @@ def test_what_nobody_goes_to_is_never_visited_and_who_stands_somewhere_always_vi
 def test_who_is_late_is_waited_for_by_those_who_hear_it() -> None:
     graph = ring()
     plan = plan_of(graph, (list(range(len(graph))), 4))
-    late = replace(PROMPT, late_m=3.0)
+    late = replace(PROMPT, leg_spread_m=3.0)
     prompt_m, _ = forecast_m(plan, graph, OPEN, PROMPT)
     talking_m, _ = forecast_m(plan, graph, OPEN, late)
     deaf_m, _ = forecast_m(plan, graph, OPEN, replace(late, talks=False))
@@ -96,7 +96,7 @@ def test_who_meet_in_a_door_wait_and_who_go_round_one_way_do_not() -> None:
     there, back = [0, 1, 2, 3], [3, 2, 1, 0]
     one_way = plan_of(graph, (there, 2))
     assert forecast_m(one_way, graph, passages, PROMPT) == forecast_m(one_way, graph, OPEN, PROMPT)
-    contrary, late = plan_of(graph, (there, 3), (back, 3)), replace(PROMPT, late_m=1.5)
+    contrary, late = plan_of(graph, (there, 3), (back, 3)), replace(PROMPT, leg_spread_m=1.5)
     assert forecast_m(contrary, graph, passages, late)[1] > forecast_m(contrary, graph, OPEN, late)[1]
 
 
@@ -107,7 +107,7 @@ def test_rounds_that_fit_while_all_are_on_time_are_driven_as_by_robots_that_are_
     three = plan_of(graph, ([0, 1, 2, 3, 2, 1], 3))
     fitting = forecast_m(three, graph, OPEN, PROMPT)
     assert forecast_m(three, graph, passages, PROMPT) == fitting
-    late = replace(PROMPT, late_m=4.0)
+    late = replace(PROMPT, leg_spread_m=4.0)
     worst_m, mean_m = forecast_m(three, graph, passages, late)
     open_m = forecast_m(three, graph, OPEN, late)
     assert worst_m > open_m[0] + 0.5
@@ -124,7 +124,7 @@ def test_few_of_those_who_meet_stand_in_each_others_way_for_long() -> None:
         assert passages.stretches == {}
         both = plan_of(graph, ([0, 1], 2))
         for meeting_m in (0.0, 1.0):
-            driving = replace(PROMPT, late_m=0.7, meeting_m=meeting_m)
+            driving = replace(PROMPT, leg_spread_m=0.7, meeting_m=meeting_m)
             worst_m[width_m, meeting_m], mean_m[width_m, meeting_m] = forecast_m(
                 both, graph, passages, driving
             )
@@ -137,7 +137,7 @@ def test_few_of_those_who_meet_stand_in_each_others_way_for_long() -> None:
 def test_who_follow_each_other_do_not_meet() -> None:
     graph, passages = two_doors()
     one_way = plan_of(graph, ([0, 1, 2, 3], 3))
-    meeting = replace(PROMPT, late_m=0.7, meeting_m=5.0)
+    meeting = replace(PROMPT, leg_spread_m=0.7, meeting_m=5.0)
     assert forecast_m(one_way, graph, passages, meeting) == forecast_m(one_way, graph, OPEN, meeting)
 
 
@@ -146,7 +146,7 @@ def test_everybody_gets_through_a_corridor_in_the_end(size: int) -> None:
     """To and fro through 6 m with room for one: slower the more there are, but each vertex is visited."""
     graph, passages = row(with_corridor(), (2.0, 2.5), (7.0, 2.5), (12.0, 2.5))
     plan = plan_of(graph, ([0, 1, 2], size))
-    late = replace(PROMPT, late_m=1.5)
+    late = replace(PROMPT, leg_spread_m=1.5)
     worst_m, mean_m = forecast_m(plan, graph, passages, late)
     assert worst_m < 3.0 * plan.rounds[0].length_m
     assert math.isfinite(mean_m)
@@ -157,7 +157,7 @@ def test_nobody_waits_for_others_in_a_passage() -> None:
     """At a stop in a corridor; with all stops in it nobody is let catch up."""
     graph, passages = row(walled(14, 0.9), (1.0, 0.45), (7.0, 0.45), (13.0, 0.45))
     assert passages.vertices_in(0.5) == {0, 1, 2}
-    plan, late = plan_of(graph, ([0, 1, 2], 2)), replace(PROMPT, late_m=6.0)
+    plan, late = plan_of(graph, ([0, 1, 2], 2)), replace(PROMPT, leg_spread_m=6.0)
     deaf = replace(late, talks=False)
     assert forecast_m(plan, graph, passages, late) == forecast_m(plan, graph, passages, deaf)
     assert forecast_m(plan, graph, OPEN, late) != forecast_m(plan, graph, OPEN, deaf)
@@ -165,6 +165,6 @@ def test_nobody_waits_for_others_in_a_passage() -> None:
 
 def test_it_is_the_same_for_whoever_asks() -> None:
     graph, passages = two_doors()
-    plan, late = plan_of(graph, ([0, 1, 2, 3], 3)), replace(PROMPT, late_m=2.0)
+    plan, late = plan_of(graph, ([0, 1, 2, 3], 3)), replace(PROMPT, leg_spread_m=2.0)
     first = forecast_m.__wrapped__(plan, graph, passages, late)
     assert forecast_m.__wrapped__(plan, graph, passages, late) == first

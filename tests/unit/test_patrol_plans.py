@@ -127,7 +127,7 @@ def test_who_hears_nobody_shares_fewer_rounds() -> None:
     deaf = replace(talking, talks=False)
     assert best_plan(talking, 4, AdaptiveRoundsConfig()).sizes == (4,)
     assert best_plan(deaf, 4, AdaptiveRoundsConfig()).sizes == (1, 1, 1, 1)
-    assert best_plan(deaf, 4, AdaptiveRoundsConfig(late_m=0.0)).sizes == (4,)
+    assert best_plan(deaf, 4, AdaptiveRoundsConfig(leg_spread_m=0.0)).sizes == (4,)
 
 
 @pytest.mark.parametrize("shut", [NONE_SHUT, ShutPaths(unreached=(3,))])

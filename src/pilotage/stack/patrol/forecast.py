@@ -41,7 +41,7 @@ class Driving:
         What turning back at a vertex costs.
     meeting_m
         What two who meet lose on average where they have just room abreast.
-    late_m, slack, most_slack
+    leg_spread_m, slack, most_slack
         How much legs differ, and when robots of a round wait for who is late.
     beside_m
         At a vertex in a passage, or no farther beside one, nobody waits.
@@ -52,7 +52,7 @@ class Driving:
     visit_m: float
     turn_m: float
     meeting_m: float
-    late_m: float
+    leg_spread_m: float
     slack: float
     most_slack: float
     beside_m: float
@@ -78,7 +78,7 @@ def forecast_m(plan: Plan, graph: PatrolGraph, passages: Passages, driving: Driv
         longest_m + max(ROUNDS * longest_m, GAPS * spaced_m),
         PASSED_RATIO * driving.visit_m,
         driving.meeting_m,
-        driving.late_m,
+        driving.leg_spread_m,
         driving.slack,
         driving.most_slack,
         driving.talks,

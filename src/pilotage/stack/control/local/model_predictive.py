@@ -6,10 +6,10 @@ import numpy as np
 
 from pilotage.core.types import Twist
 from pilotage.kernels.control.rollouts import later, rollout_costs, weighted_mean
-from pilotage.stack.control.local.gap_horizon_config import SampledPlansConfig
 from pilotage.stack.control.local.role import LOCAL_CONTROLLERS, LocalView
 from pilotage.stack.control.local.rolling import Scene
 from pilotage.stack.control.local.rolling_step import RollingController
+from pilotage.stack.control.local.sampled_plans import SampledPlansConfig
 from pilotage.stack.control.local.sampling import NoiseBank
 
 

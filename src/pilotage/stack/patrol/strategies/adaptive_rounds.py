@@ -35,10 +35,10 @@ class AdaptiveRoundsConfig(Config):
     one that several robots share counts ``sharing_cost`` more there and its mean half of that. Of the plans
     found the one is taken whose forecast is best: its worst plus ``forecast_mean_weight`` times its mean,
     ``forecast_sharing_cost`` of that more where robots share a round, for what it does not know. In it legs
-    take up to half of ``late_m`` more or less, and two who come near each other lose ``meeting_m`` of driving
-    on average where they have just room abreast: most pass at once, now and then they stand in each other's
-    way for long. A round on which robots are nearer to each other than ``headway_m``, who watch and avoid
-    each other all the time, is taken only where there is no other.
+    take up to half of ``leg_spread_m`` more or less, and two who come near each other lose ``meeting_m`` of
+    driving on average where they have just room abreast: most pass at once, now and then they stand in each
+    other's way for long. A round on which robots are nearer to each other than ``headway_m``, who watch and
+    avoid each other all the time, is taken only where there is no other.
 
     A robot waits while it is further ahead of its place among those that share its round than ``slack`` of a
     mean leg between stops, within which nobody knows where the others are, or ``most_slack`` of the time
@@ -50,7 +50,7 @@ class AdaptiveRoundsConfig(Config):
     sharing_cost: NonNegative = 0.06
     forecast_mean_weight: NonNegative = 0.5
     forecast_sharing_cost: NonNegative = 0.03
-    late_m: NonNegative = 0.7
+    leg_spread_m: NonNegative = 0.7
     meeting_m: NonNegative = 0.5
     headway_m: NonNegative = 6.0
     slack: Positive = 0.5
@@ -83,7 +83,7 @@ def best_plan(setting: PatrolSetting, robots: int, config: AdaptiveRoundsConfig)
         visit_m=setting.visit_m,
         turn_m=setting.turn_m,
         meeting_m=config.meeting_m,
-        late_m=config.late_m,
+        leg_spread_m=config.leg_spread_m,
         slack=config.slack,
         most_slack=config.most_slack,
         beside_m=config.beside_passage_m,
