@@ -22,7 +22,7 @@ from pilotage.stack.interface import Belief, BeliefStatus
 from pilotage.stack.localization.ekf_landmarks import EkfLandmarkLocalizer
 from pilotage.stack.localization.landmark_filter import LandmarkFilterConfig
 from pilotage.stack.localization.odometry_watch import OdometryWatch
-from pilotage.stack.localization.self_check import HOLD_S, NOISE_SHARE, ExplainedShare, SelfCheck
+from pilotage.stack.localization.self_check import HOLD_S, NOISE_SHARE, SOON_S, ExplainedShare, SelfCheck
 from support.bare_robots import ON_BEACONS, ON_WALLS
 from support.robots import BEACONS, told_of
 
@@ -184,6 +184,21 @@ class TestWatching:
         assert check.begin_anew(4.5) is counts
         assert check.lost(4.5) is not counts
         assert check.lost(4.4 + 1.5 * HOLD_S) is not counts  # told another motion than the robot's: longer
+
+    def test_who_was_in_doubt_a_while_ago_may_refuse_half_as_much(self) -> None:
+        """A third refused says nothing of a filter never in doubt, nor of one in doubt long ago."""
+
+        def told(check: SelfCheck, begin_s: float) -> bool:
+            for k in range(30):
+                check.tell(begin_s + 0.1 * k, 6, 4, 8.0, 8.0)
+            return check.lost(begin_s + 3.0)
+
+        assert not told(SelfCheck(), 0.0)
+        for ago_s, lost in ((1.0, True), (SOON_S - 4.0, True), (SOON_S + 1.0, False)):
+            check = SelfCheck()
+            check.alarm(0.0)
+            assert not check.lost(HOLD_S)
+            assert told(check, HOLD_S + ago_s) is lost
 
     def test_readings_in_their_band_say_nothing(self) -> None:
         """Of chi-square NIS: 6 sigma of the sum over the window, a false alarm in some 1e9 updates."""

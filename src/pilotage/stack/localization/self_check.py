@@ -27,7 +27,9 @@ MOST_NOISE = 15.0
 """By how much more than it believes the variances may be."""
 HOLD_S, MOST_HOLD_S = 3.0, 60.0
 """How long all has to be well before it is believed again; doubled each time that it was not for long."""
-SOON_S = 30.0
+SOON_S, REFUSED_AFTER = 30.0, 0.5
+"""For so long after a doubt another one counts as the same, and of the share that may be refused only so much
+may be: where all readings are off, a filter that gives way to them fits for a while, and refuses fewer."""
 RECENT, USUAL, FORGOTTEN, DEVIATES = 0.1, 0.02, 0.002, 0.1
 """What a new scan counts in the two means, and in the long one while the robot does not trust its place; and
 of that in how far the first usually is from the second: rooms differ in time, a wrong filter at once."""
@@ -51,6 +53,7 @@ class SelfCheck:
     ) -> None:
         self._gate, self._noise_share = gate, noise_share
         self._used_share = (1.0 - refused_share) * gate
+        self._used_share_after = (1.0 - REFUSED_AFTER * refused_share) * gate
         self._updates: deque[tuple[float, ...]] = deque()
         self._sums = [0.0, 0.0, 0.0, 0.0]
         self._windows: list[tuple[float, ...]] | None = None if noise_share is None else []
@@ -72,7 +75,8 @@ class SelfCheck:
         share, ratio = used / all_seen, total / mean if mean > 0.0 else 1.0
         # Chi-square values add up to one of as many degrees of freedom as their mean, of twice the variance.
         excess = max(NIS_EXCESS, NIS_SIGMAS * math.sqrt(2.0 / max(mean, 1.0)))
-        if share < self._used_share * self._own_share or ratio > (1.0 + excess) * self._own_nis:
+        used_share = self._used_share_after if t_s < self._until_s + SOON_S else self._used_share
+        if share < used_share * self._own_share or ratio > (1.0 + excess) * self._own_nis:
             self._amiss = True
             self.alarm(t_s)
         self._count += 1
