@@ -112,6 +112,12 @@ def test_what_comes_too_near_is_said_where() -> None:
     assert "to turn to it" in behind.reason
 
 
+def test_a_route_to_another_country_is_refused_before_it_is_laid_out() -> None:
+    """At 1 cm a state, 1,000 km there and back took 7 GB."""
+    with pytest.raises(InputError, match=r"at most 50000 m, found 2e\+06 m; look for a number in points_m"):
+        RoutePlanner(RouteConfig(points_m=[(1.0, 1.0), (1e6, 1.0), (24.25, 6.5), (1.4, 1.6)]))
+
+
 def test_misuse_is_refused() -> None:
     with pytest.raises(InputError, match="turns back"):
         RoutePlanner(RouteConfig(points_m=[(0, 0), (4, 0), (1, 0)]))

@@ -29,6 +29,9 @@ from pilotage.stack.planning.driving_space import (
 from pilotage.stack.planning.plan_status import PlanStatus
 from pilotage.stack.planning.planner import PLANNERS, Path, PlanRequest, PlanResult
 
+MOST_STATES = 5_000_000
+"""Of which a route is checked, ``CHECK_SPACING_M`` apart: 50 km. A typing error is no road to the moon."""
+
 
 class RouteConfig(Config):
     """The points of the route and how its corners are rounded.
@@ -66,13 +69,20 @@ class RoutePlanner:
     Raises
     ------
     InputError
-        From the constructor where the corners cannot be rounded; from ``plan`` where the goal is not the
-        route's end.
+        From the constructor where the corners cannot be rounded or the route is too long to be checked; from
+        ``plan`` where the goal is not the route's end.
     """
 
     def __init__(self, config: RouteConfig) -> None:
         self._config = config
         self._points = np.array(config.points_m, dtype=np.float64)
+        length_m = float(np.hypot(*np.diff(self._points, axis=0).T).sum())
+        most_m = MOST_STATES * CHECK_SPACING_M
+        if length_m > most_m:
+            raise InputError(
+                f"route: expected a route of at most {most_m:g} m, found {length_m:g} m; "
+                "look for a number in points_m that is too large"
+            )
         try:
             _rounded(self._points, None, None, config)
         except _DoesNotFitError as error:
