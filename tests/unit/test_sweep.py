@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import itertools
+import math
 from functools import cache
 
 import numpy as np
@@ -15,7 +16,14 @@ from pilotage.experiments import warm_up
 from pilotage.experiments.build.build import build
 from pilotage.experiments.loop import run_loop
 from pilotage.experiments.mission import mission_of
-from pilotage.kernels.patrol.passes import Ground, recount
+from pilotage.kernels.patrol.passes import (
+    Ground,
+    count_along,
+    left_in_blocks,
+    most_swept,
+    runs_of_change,
+    settle,
+)
 from pilotage.kernels.patrol.reshape import is_free, reshape, straightened
 from pilotage.kernels.patrol.swept import mark_swept
 from pilotage.kernels.tours.entries import anneal_entries, entries_cost
@@ -228,9 +236,18 @@ def ground_of(path: FloatArray, must: BoolArray, free: BoolArray | None = None) 
     grid = 0.0, 0.0, CELL_M
     kinds, counts = np.where(must, np.uint8(2), np.uint8(0)), np.zeros(SHAPE, np.int16)
     prices = 0.0, 0.0, 60.0 * CELL_M**2 / WIDTH_M
-    ground = WIDTH_M, grid, kinds, prices, counts, grid, np.ones(SHAPE, np.bool_) if free is None else free
-    recount(NO_LEGS, np.hstack([path[:-1], path[1:]]), True, ground)
+    paths = np.ones(SHAPE, np.bool_) if free is None else free
+    ground = WIDTH_M, grid, kinds, prices, counts, grid, paths, left_in_blocks(kinds, counts)
+    count_along(path, ground)
     return ground
+
+
+def recount(old: FloatArray, new: FloatArray, settled: bool, ground: Ground) -> float:
+    """What more is left with some legs in the place of others; the ground counts them if it is settled."""
+    more, runs = runs_of_change(old, new, math.inf, ground)
+    if settled:
+        settle(runs, ground)
+    return more
 
 
 def reshaped(path: FloatArray, ground: Ground, tries: int) -> FloatArray:
@@ -274,6 +291,27 @@ def test_what_changes_is_counted_as_if_all_were_counted_anew() -> None:
         assert (grounds[0][4] == before).all()
         assert recount(old, new, True, grounds[0]) == pytest.approx(left[1] - left[0])
         assert (grounds[0][4] == grounds[1][4]).all()
+        for _, _, kinds, _, counts, _, _, kept in grounds:
+            assert (kept == left_in_blocks(kinds, counts)).all()
+
+
+def test_changes_that_lose_too_much_are_not_looked_at_to_the_end() -> None:
+    """What is found up to there is too much already; what legs sweep at most is no less than what they do."""
+    rng = np.random.default_rng(7)
+    must, cut = rng.random(SHAPE) < 0.7, 0
+    for _ in range(40):
+        others, old, new = (rng.uniform(-0.3, 6.7, (number, 4)) for number in (20, 2, 1))
+        ground = ground_of(np.zeros((1, 2)), must)
+        recount(NO_LEGS, np.vstack([others, old]), True, ground)
+        best = most_swept(new, ground)
+        assert best >= -recount(NO_LEGS, new, False, ground) - 1e-9
+        more, runs = runs_of_change(old, new, math.inf, ground)
+        for bar in (0.1, 1.0, 3.0):
+            found, some = runs_of_change(old, new, bar + best, ground)
+            assert (found > bar) == (more > bar)
+            assert found == pytest.approx(more) or len(some) < len(runs)
+            cut += len(some) < len(runs)
+    assert cut > 10
 
 
 def test_a_path_is_changed_to_what_it_needs_and_leaves_nothing_out() -> None:

@@ -13,6 +13,7 @@ ComplexArray: TypeAlias = NDArray[np.complex128]
 BoolArray: TypeAlias = NDArray[np.bool_]
 ByteArray: TypeAlias = NDArray[np.uint8]
 ShortArray: TypeAlias = NDArray[np.int16]
+SpanArray: TypeAlias = NDArray[np.int32]
 UintArray: TypeAlias = NDArray[np.uint32]
 WordArray: TypeAlias = NDArray[np.uint64]
 

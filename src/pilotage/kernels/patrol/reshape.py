@@ -14,7 +14,7 @@ import numpy as np
 from pilotage.kernels.arrays import BoolArray, FloatArray
 from pilotage.kernels.geometry.plane import point_segment_distance
 from pilotage.kernels.jit import kernel
-from pilotage.kernels.patrol.passes import Grid, Ground, recount
+from pilotage.kernels.patrol.passes import Grid, Ground, most_swept, runs_of_change, settle
 
 NEAR, LONGEST_LEG, LONGEST_CHAIN, LEAST_MOVE = 1.8, 2.6, 12, 0.02
 """In widths: vertices so near are joined in other ways, legs get no longer, and vertices move so little. So
@@ -40,7 +40,7 @@ def is_taken(old: FloatArray, new: FloatArray, bar: float, ground: Ground) -> bo
 
     The ground counts the new ones then.
     """
-    width, _, _, _, _, grid, free = ground
+    width, _, _, _, _, grid, free, _ = ground
     cost = 0.0
     for k in range(old.shape[0]):
         cost -= math.hypot(old[k, 2] - old[k, 0], old[k, 3] - old[k, 1])
@@ -52,12 +52,16 @@ def is_taken(old: FloatArray, new: FloatArray, bar: float, ground: Ground) -> bo
     # What is a width longer hardly ever sweeps so much more: not worth counting cells.
     if cost > bar + width:
         return False
+    enough = bar - cost + most_swept(new, ground)
+    if enough < 0.0:
+        return False
     for k in range(new.shape[0]):
         if not is_free(new[k, :2], new[k, 2:], free, grid):
             return False
-    if cost + recount(old, new, False, ground) > bar:
+    more, runs = runs_of_change(old, new, enough, ground)
+    if cost + more > bar:
         return False
-    recount(old, new, True, ground)
+    settle(runs, ground)
     return True
 
 
@@ -228,7 +232,7 @@ def straightened(path: FloatArray, off: float, ground: Ground) -> FloatArray:
 
     From each vertex on the line leads to the farthest one that may be next, tried one by one.
     """
-    _, _, _, _, _, grid, free = ground
+    _, _, _, _, _, grid, free, _ = ground
     keep = np.zeros(path.shape[0], np.bool_)
     keep[0] = True
     first = 0
