@@ -16,14 +16,11 @@ from pilotage.core.types import STOP, Goal, Pose2, Twist
 from pilotage.experiments.mission import mission_of
 from pilotage.experiments.run import run_mission
 from pilotage.kernels.geometry import chain
-from pilotage.kernels.scans.rays import fan_ranges
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.models.footprint import Footprint
-from pilotage.sensors.lidar import LidarConfig
-from pilotage.sensors.readings import LidarScan, Readings
+from pilotage.sensors.readings import Readings
 from pilotage.sim.source import Simulator
 from pilotage.sim.worlds.world import World
-from pilotage.stack.control.guard import ScanGuard
 from pilotage.stack.control.pi_follower import PiFollower, PiFollowerConfig
 from pilotage.stack.interface import Belief, BeliefStatus, StackStatus
 from pilotage.stack.localization.ekf_landmarks import EkfLandmarkLocalizer
@@ -40,7 +37,6 @@ from support.missions import reach
 from support.robots import ROOM, Told, sensors, told_of
 from support.worlds import DISC, ROOM_MAP, Alone, alone, robot, walled
 
-WALL_AHEAD, NONE = np.array([[0.37, -3.0, 0.37, 3.0]]), np.zeros((0, 3))
 START = Pose2(2.0, 2.0, 0.0)
 
 
@@ -352,24 +348,3 @@ def test_who_is_not_where_it_believes_drives_into_nothing_that_its_laser_shows(
     status, why = stack.status
     assert status is StackStatus.ARRIVED or "the stack has no escape" in why
     assert not outline.is_disc or math.hypot(sim.truth.x_m - 8.0, sim.truth.y_m + off_m - 6.0) < 0.3
-
-
-def test_a_command_is_looked_at_by_what_the_laser_shows_as_far_as_it_takes_to_stop() -> None:
-    told = told_of()
-    guard = ScanGuard(told.robot)
-    scan = LidarScan(
-        fan_ranges(0.0, 0.0, -0.75 * math.pi, LidarConfig().beam_step_rad, 539, 20.0, WALL_AHEAD, NONE)
-    )
-    seen = Readings(0.1, {"lidar": scan})
-    assert len(guard.touched_m(Twist(0.5, 0.0), seen)) > 0
-    # Slowly there is room to stop; away, along, on the spot and without a scan as well.
-    for command in (Twist(0.1, 0.0), Twist(-0.5, 0.0), Twist(0.0, 1.0), STOP):
-        assert len(guard.touched_m(command, seen)) == 0
-    assert len(guard.touched_m(Twist(0.5, 0.0), Readings(0.1, {}))) == 0
-    # Corners swing where a disc does not.
-    corners_m = np.array([[0.35, 0.2], [-0.1, 0.2], [-0.1, -0.2], [0.35, -0.2]])
-    angular = ScanGuard(replace(told.robot, footprint=Footprint.polygon(corners_m)))
-    assert len(angular.touched_m(Twist(0.0, -1.5), seen)) > 0
-    assert len(angular.touched_m(Twist(-0.3, 0.0), seen)) == 0
-    blind = replace(told.robot, sensors={})
-    assert len(ScanGuard(blind).touched_m(Twist(0.5, 0.0), seen)) == 0

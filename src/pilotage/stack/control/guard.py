@@ -1,28 +1,19 @@
-"""The last word before a command leaves: do not drive where map or laser say there is no room."""
+"""Do not drive where the robot's own map says that there is no room."""
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 
 from pilotage.core.config import Config
-from pilotage.core.types import STOP, FloatArray, Pose2, Twist
+from pilotage.core.types import FloatArray, Pose2, Twist
 from pilotage.kernels.bodies.outline import least_along
 from pilotage.kernels.geometry.motion import exact_arc
 from pilotage.kernels.rrt import local_path
 from pilotage.maps.near_walls import NearWalls
-from pilotage.sensors.lidar import LidarConfig
-from pilotage.sensors.readings import LidarScan, Readings
 from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.knowledge import RobotKnowledge
 
 PIECES = 4
-TOUCH_M = 0.01
-"""What the laser shows nearer than this on the way of a command is touched."""
-MOST_PIECES = 100
-"""A metre, within which a robot that is guarded stops."""
-ORIGIN, NO_WALLS, NOTHING = Pose2(0.0, 0.0, 0.0), np.empty((0, 4)), np.empty((0, 2))
 
 
 class GuardConfig(Config):
@@ -84,57 +75,6 @@ class ArcGuard:
         now_m = least_along(poses[:1], corners, radius_m, near, circles_m)
         least_m = least_along(poses[1:], corners, radius_m, near, circles_m)
         return bool(least_m >= min(self._margin_m, now_m))
-
-
-class ScanGuard:
-    """Checks the arc of a command, and the stop after it, against what the laser shows, whatever maps say.
-
-    Who knows his place badly passes walls by his map that stand elsewhere. Whoever gets no nearer to what he
-    touches, or is about to, may. Idle without exactly one lidar; where that does not look it knows nothing.
-    """
-
-    def __init__(self, robot: RobotKnowledge) -> None:
-        motion, self._footprint = robot.motion, robot.footprint
-        self._braking_m_s2 = min(motion.braking_m_s2, motion.top_speed_m_s / robot.dt_s)
-        self._slowing_rad_s2 = min(motion.turn_acceleration_rad_s2, motion.top_turn_rate_rad_s / robot.dt_s)
-        self._reacts_s = robot.dt_s + motion.delay_s
-        lidars = list(robot.sensors_of(LidarConfig).items())
-        self._name = ""
-        if len(lidars) != 1:
-            return
-        self._name, lidar = lidars[0]
-        angles_rad = lidar.mount.theta_rad + lidar.beam_angles_rad()
-        self._directions = np.column_stack([np.cos(angles_rad), np.sin(angles_rad)])
-        self._from_m = lidar.mount.as_array()[:2]
-        self._reach_m = robot.radius_m + TOUCH_M + math.hypot(*self._from_m)
-        # A return that is told too near is no contact.
-        self._margin_m = TOUCH_M - 3.0 * math.sqrt(lidar.range_var_m2)
-
-    def touched_m(self, command: Twist, readings: Readings) -> FloatArray:
-        """(K, 2) in the base frame what this step's scan shows around a robot that would touch some of it.
-
-        Of none where it would not, or there is no scan.
-        """
-        scan = readings.by_sensor.get(self._name)
-        if not isinstance(scan, LidarScan) or command is STOP:
-            return NOTHING
-        speed_m_s = abs(command.v_m_s)
-        # At full speed as far as while it brakes.
-        stops_s = max(speed_m_s / self._braking_m_s2, abs(command.w_rad_s) / self._slowing_rad_s2)
-        until_s = self._reacts_s + 0.5 * stops_s
-        reach_m = self._reach_m + speed_m_s * until_s
-        if not np.fmin.reduce(scan.ranges_m) < reach_m:
-            return NOTHING
-        near = scan.ranges_m < reach_m
-        ends_m = self._from_m + scan.ranges_m[near, None] * self._directions[near]
-        circles_m = np.column_stack([ends_m, np.zeros(len(ends_m))])
-        corners, radius_m = self._footprint.points_m, self._footprint.radius_m
-        # So finely that no corner skips over what is touched.
-        swept_m = (speed_m_s + abs(command.w_rad_s) * radius_m) * until_s + TOUCH_M
-        poses = _along(command, ORIGIN, until_s, min(math.ceil(swept_m / TOUCH_M), MOST_PIECES))
-        now_m = least_along(poses[:1], corners, radius_m, NO_WALLS, circles_m)
-        then_m = least_along(poses[1:], corners, radius_m, NO_WALLS, circles_m)
-        return ends_m if then_m < min(self._margin_m, now_m) else NOTHING
 
 
 def _along(command: Twist, pose: Pose2, horizon_s: float, pieces: int) -> FloatArray:

@@ -22,6 +22,8 @@ from pilotage.stack.perception.unexplained import UnexplainedReturns
 
 NEARER_M = 1e-3
 """Who is nearer to a wall, as it believes, may be by so much more."""
+SAME_M = 0.03
+"""So near to each other two points are of the same thing."""
 LOOK_M = 0.02
 """Poses along the path are looked at so close together."""
 
@@ -87,12 +89,25 @@ class OwnHalf:
             [seen.points_m[scan.ranges_m[seen.beams] < reach_m], mapped_m[away_m < reach_m, :2]]
         )
 
+    def sees(self, points_m: FloatArray) -> bool:
+        """Whether some of points (K, 2), in the map, are of what it heeds."""
+        if not len(self.seen_m):
+            return False
+        away_m = np.hypot(*(points_m[:, None] - self.seen_m[None]).transpose(2, 0, 1))
+        return bool(away_m.min() < SAME_M)
+
     def stops_within_m(self, speed_m_s: float) -> float:
         """How far it gets from a speed, before it reacts and while it brakes."""
         return speed_m_s * self.reacts_s + 0.5 * speed_m_s**2 / self._braking_m_s2
 
     def fastest_m_s(
-        self, pose: Pose2, ahead: FloatArray, share: float = 1.0, to_walls_m: float = 0.0
+        self,
+        pose: Pose2,
+        ahead: FloatArray,
+        share: float = 1.0,
+        to_walls_m: float = 0.0,
+        *,
+        by_map: bool = True,
     ) -> float:
         """The speed from which it can stop in time on a path; inf where nothing stands to be heeded.
 
@@ -107,13 +122,17 @@ class OwnHalf:
         to_walls_m
             What it keeps from walls, at most what the outline as it was handed in keeps; nearer, it comes no
             nearer.
+        by_map
+            Whether its map's walls count.
         """
         if len(ahead) < 2:
             return math.inf
         poses, along_m = _from_here(ahead)
         placed = np.column_stack([pose.placed(poses[:, :2]), pose.theta_rad + poses[:, 2]])
-        car = self._car._replace(clearance=min(to_walls_m, self._car.clearance))
-        clear = hybrid.poses_that_fit(placed, NEARER_M, car, self._ground)
+        clear = len(poses)
+        if by_map:
+            car = self._car._replace(clearance=min(to_walls_m, self._car.clearance))
+            clear = hybrid.poses_that_fit(placed, NEARER_M, car, self._ground)
         if len(self.seen_m):
             outline, gap_m = self._footprint, share * self._config.gap_m
             seen_m = pose.seen(self.seen_m)

@@ -14,11 +14,14 @@ from pilotage.core.errors import InputError
 from pilotage.core.types import STOP, FloatArray, Pose2, Twist
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.readings import Readings
+from pilotage.sensors.sensor import Positive
+from pilotage.stack.control.last_word import LastWord
 from pilotage.stack.interface import NAVIGATORS, Belief, PlannedPath, StackStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.navigator.cells import CellRoute, CostMapConfig, curve_along, grid_of, route_over_cells
 from pilotage.stack.navigator.navigator import (
+    AROUND,
     DISC_HINT,
     Parts,
     arrival_within_m,
@@ -61,6 +64,8 @@ class CurveConfig(Config):
     spline: SplineConfig | None = SplineConfig()
     speed_m_s: float | None = Field(default=None, gt=0.0)
     """Along the curve; None: as fast as the robot can take its bends."""
+    patience_s: Positive = 20.0
+    """The reference waits for so long while the lasers show something where the robot would drive."""
 
 
 @NAVIGATORS.add("curve", CurveConfig)
@@ -70,7 +75,8 @@ class CurveNavigator:
     The reference moves along the curve, at constant speed where one is set (equations 5.1 to 5.6);
     the controller follows it from the believed pose. Arrives when the reference does, or up to 5 s later
     where the robot is not within half the goal's tolerance yet, but for one that is not within it even then.
-    Fails at once where a car's curve is none that it can drive.
+    Fails at once where a car's curve is none that it can drive. Before what its lasers show in its way it
+    stands and its reference waits: whoever walks goes on; it plans nothing anew, and fails where that stays.
     """
 
     def __init__(
@@ -97,6 +103,7 @@ class CurveNavigator:
         asked_m_s = config.speed_m_s
         self._speed_m_s = None if asked_m_s is None else min(asked_m_s, robot.motion.top_speed_m_s)
         self._outline = robot.footprint
+        self._last_word, self._patience_s = LastWord(robot), config.patience_s
         self._tolerance_m, self._waited_s = task.goal_tolerance_m, 0.0
         self._arrival_m = arrival_within_m(None, task.goal_tolerance_m)
         self._status, self._reason = StackStatus.RUNNING, ""
@@ -216,35 +223,27 @@ class CurveNavigator:
         return self._status, self._reason
 
     def step(self, readings: Readings) -> Twist:
-        """Localize, move the reference on, and follow it."""
+        """Localize, move the reference on where the lasers leave room for it, and follow it."""
         assert self._localizer is not None
-        assert self._controller is not None
         pose = self._localizer.step(readings).pose
         if self._status is not StackStatus.RUNNING:
             return STOP
-        last = len(self._references) - 1
-        if self._index >= last:
-            x, y, *_ = self._references[-1].tolist()
-            self._waited_s += self._dt_s
-            away_m = math.hypot(x - pose.x_m, y - pose.y_m)
-            if away_m > self._arrival_m and self._waited_s <= CATCHES_UP_S:
-                return self._controller.step(pose, Pose2(x, y, pose.theta_rad), STOP).twist
-            if away_m > self._tolerance_m:
-                self._reason = f"the reference is at the curve's end, the robot {away_m:.2f} m from it"
-                self._status = StackStatus.FAILED
-                self._journal.say(readings.t_s, "failed", self._reason)
-                return STOP
-            turns = self._motion.least_turning_radius_m == 0.0
-            off_rad = turn_at_goal_rad(self._task, pose) if turns else 0.0
-            if off_rad:
-                return turned_by(off_rad, self._motion.top_turn_rate_rad_s)
-            self._status = StackStatus.ARRIVED
-            self._reason = f"driven to the curve's end, by its own estimate {away_m:.2f} m from it"
-            self._journal.say(readings.t_s, "arrived", self._reason)
-            return STOP
+        self._last_word.take_in(readings)
+        at_end = self._index >= len(self._references) - 1
+        command = self._at_end(readings.t_s, pose) if at_end else self._along(pose)
+        if self._last_word.allows(command):
+            self._index += not at_end
+            return command
+        self._waited_s -= self._dt_s * at_end
+        if self._last_word.held_s >= self._patience_s:
+            self._end(readings.t_s, StackStatus.FAILED, f"stuck: {self._last_word.why}{AROUND}")
+        return STOP
+
+    def _along(self, pose: Pose2) -> Twist:
+        """The command to the next reference."""
+        assert self._controller is not None
         x, y, theta, curvature, to_go_m = self._references[self._index + 1].tolist()
         here = self._references[self._index]
-        self._index += 1
         reference = Pose2(x, y, wrap_to_pi(theta))
         speed = (float(here[4]) - to_go_m) / self._dt_s
         turned = wrap_to_pi(theta - float(here[2])) / self._dt_s
@@ -252,3 +251,27 @@ class CurveNavigator:
         if speed == 0.0:
             return Twist(0.0, turned + HEADING_PER_S * wrap_to_pi(theta - pose.theta_rad))
         return self._controller.step(pose, reference, Twist(speed, turned if curvature else 0.0)).twist
+
+    def _at_end(self, t_s: float, pose: Pose2) -> Twist:
+        """On towards the end where the reference is and the robot is not, then to the goal's heading."""
+        assert self._controller is not None
+        x, y, *_ = self._references[-1].tolist()
+        self._waited_s += self._dt_s
+        away_m = math.hypot(x - pose.x_m, y - pose.y_m)
+        if away_m > self._arrival_m and self._waited_s <= CATCHES_UP_S:
+            return self._controller.step(pose, Pose2(x, y, pose.theta_rad), STOP).twist
+        if away_m > self._tolerance_m:
+            why = f"the reference is at the curve's end, the robot {away_m:.2f} m from it"
+            self._end(t_s, StackStatus.FAILED, why)
+            return STOP
+        turns = self._motion.least_turning_radius_m == 0.0
+        off_rad = turn_at_goal_rad(self._task, pose) if turns else 0.0
+        if off_rad:
+            return turned_by(off_rad, self._motion.top_turn_rate_rad_s)
+        why = f"driven to the curve's end, by its own estimate {away_m:.2f} m from it"
+        self._end(t_s, StackStatus.ARRIVED, why)
+        return STOP
+
+    def _end(self, t_s: float, status: StackStatus, why: str) -> None:
+        self._status, self._reason = status, why
+        self._journal.say(t_s, str(status), why)

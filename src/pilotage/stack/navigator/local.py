@@ -13,6 +13,7 @@ from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.readings import Readings
 from pilotage.sensors.sensor import NonNegative, Positive
 from pilotage.stack.control.give_way import GiveWay, GiveWayConfig
+from pilotage.stack.control.last_word import LastWord
 from pilotage.stack.control.local.drive import LocalDrive
 from pilotage.stack.control.make_room import MakeRoom, MakeRoomConfig
 from pilotage.stack.control.wander import WanderConfig
@@ -105,7 +106,8 @@ class LocalNavigator(LocalizingNavigator):
             DeadReckoningConfig(), robot, chart, task.initial, journal
         )
         super().__init__(localizer, journal)
-        self._wandering = Wandering(config.wander, robot, localizer)
+        self._last_word = LastWord(robot)
+        self._wandering = Wandering(config.wander, robot, localizer, self._last_word)
         self._bodies = MovingBodies(
             config.moving_bodies, robot, chart, mates=task.mates, unexplained=unexplained_of(parts)
         )
@@ -137,6 +139,7 @@ class LocalNavigator(LocalizingNavigator):
         belief = self._localizer.step(readings)
         pose = belief.pose
         self._drive.move(readings)
+        self._last_word.take_in(readings)
         away_m = math.hypot(self._goal_xy_m[0] - pose.x_m, self._goal_xy_m[1] - pose.y_m)
         if self._is_lost(readings.t_s, belief):
             # Where the goal is nobody knows: a belief that was given up lies in the middle of the map.
@@ -167,7 +170,9 @@ class LocalNavigator(LocalizingNavigator):
         # Weak brakes would carry it through the goal: it stops first, and comes back.
         there = not (led or off_rad) and (abs(self._drive.rolls_m()) <= self._task.goal_tolerance_m)
         self._tell(readings.t_s, there=there)
-        return STOP if self._status is not StackStatus.RUNNING else command
+        if self._status is not StackStatus.RUNNING or not self._last_word.allows(command):
+            return STOP
+        return command
 
     def _is_lost(self, t_s: float, belief: Belief) -> bool:
         """Whether it does not know where it is any more; before its first plan the plan waits to know."""

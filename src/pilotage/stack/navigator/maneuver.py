@@ -16,6 +16,7 @@ from pilotage.sensors.readings import Readings
 from pilotage.sensors.sensor import Positive
 from pilotage.stack.control.controller import Controller
 from pilotage.stack.control.kanayama import KanayamaConfig, KanayamaController
+from pilotage.stack.control.last_word import LastWord
 from pilotage.stack.control.own_half import OwnHalf, OwnHalfConfig
 from pilotage.stack.interface import NAVIGATORS, Belief, BeliefStatus, StackStatus
 from pilotage.stack.journal import Journal
@@ -54,6 +55,8 @@ AROUND, BACKING = 0.6, 0.2
 """Shares of the gap that are kept where it drives around somebody, and where it backs out before him."""
 WALL_M, LEAST_M = 0.02, 0.005
 """Kept from the walls of the map on a path for the outline, or half of what the path keeps; and at least."""
+MOST_STOPS, STEP_BACK_M = 12, 0.5
+"""How often it plans anew where its lasers show no room for its plan, and from how far before that."""
 SEEN_M = 0.05
 """What is seen and on no map counts as discs of this radius where a path around it is planned."""
 
@@ -122,7 +125,9 @@ class ManeuverNavigator(LocalizingNavigator):
             parts.planner, parts.smoother, chart, rng, journal, robot=robot, as_planned=True
         )
         self._reference = Reference(np.zeros((0, 5)), robot.dt_s)
-        self._replans, self._rests, self._backs = 0, 0, False
+        self._last_word = LastWord(robot)
+        self._replans, self._rests, self._stops = 0, 0, 0
+        self._backs = False
         self._to_walls_m = 0.0
         self._trail: Trail | None = None
         self._think_at_s = 0.0
@@ -217,6 +222,7 @@ class ManeuverNavigator(LocalizingNavigator):
     def step(self, readings: Readings) -> Twist:
         """Localize, move the reference on, and follow it."""
         belief = self._localizer.step(readings)
+        self._last_word.take_in(readings)
         if self._status is not StackStatus.RUNNING or belief.status is BeliefStatus.LOST:
             return STOP
         if readings.t_s >= self._think_at_s:
@@ -237,19 +243,52 @@ class ManeuverNavigator(LocalizingNavigator):
         if math.hypot(there[0] - pose.x_m, there[1] - pose.y_m) > self._config.astray_m:
             return self._astray(readings.t_s)
         rate = self._reference.rate
+        command = STOP if rate == 0.0 else self._toward(pose, Pose2(x, y, theta), Twist(v, w))
+        if not self._last_word.allows(command):
+            shown_m = pose.placed(self._last_word.shown_m)
+            if not self._own_half.sees(shown_m):
+                return self._stops_short(readings.t_s, shown_m)
+            # What no map explains may go by itself: as before all that it heeds it waits.
+            self._reference.stay()
+            (x, y, theta), rate, command = there.tolist(), 0.0, STOP
         act = self._yielding.step(rate, rate * abs(speed_m_s) * self._robot.dt_s, backs=self._backs)
         self._yielding.drove(np.array([x, y, theta]), backs=self._backs)
         if act is not Act.NOTHING:
             return self._yields(readings.t_s, act)
-        if rate == 0.0:
-            return STOP
+        return command
+
+    def _toward(self, pose: Pose2, there: Pose2, feedforward: Twist) -> Twist:
+        """The command that follows the reference."""
+        v, w = feedforward.v_m_s, feedforward.w_rad_s
         if v == 0.0:
             turns = self._robot.motion.least_turning_radius_m == 0.0
-            return Twist(0.0, w + HEADING_PER_S * wrap_to_pi(theta - pose.theta_rad) if turns else w)
-        control = self._controller.step(pose, Pose2(x, y, theta), Twist(v, w))
+            return Twist(
+                0.0, w + HEADING_PER_S * wrap_to_pi(there.theta_rad - pose.theta_rad) if turns else w
+            )
+        twist = self._controller.step(pose, there, feedforward).twist
         # The way back along the path is the other direction's: a piece is driven in its own only.
-        forward = max(control.twist.v_m_s, 0.0) if v > 0.0 else min(control.twist.v_m_s, 0.0)
-        return Twist(forward, control.twist.w_rad_s)
+        return Twist(max(twist.v_m_s, 0.0) if v > 0.0 else min(twist.v_m_s, 0.0), twist.w_rad_s)
+
+    def _stops_short(self, t_s: float, shown_m: FloatArray) -> Twist:
+        """A laser shows a wall where the plan leads: with (K, 2) of it on its own map it plans anew.
+
+        From some way back, where it can: beside what it almost touches there is no room for a plan.
+        """
+        self._stops += 1
+        if self._stops > MOST_STOPS:
+            self._end(t_s, StackStatus.FAILED, "stuck: its lasers show no room where its plans lead")
+            return STOP
+        self._own_map.show(shown_m)
+        self._journal.count("replans")
+        back = np.zeros((0, 3)) if self._backs else self._yielding.way_back(STEP_BACK_M)
+        if len(back):
+            self._lay_out_states(back, self._robot.motion.least_turning_radius_m or 1.0)
+            self._backs = True
+            self._journal.say(t_s, "back-out", "its lasers show no room where its plan leads: backs out")
+        else:
+            self._backs = False
+            self._think(t_s)
+        return STOP
 
     def _heed(self, readings: Readings, belief: Belief) -> None:
         """Let the reference's clock run as fast as what the laser sees leaves room for."""
@@ -261,7 +300,9 @@ class ManeuverNavigator(LocalizingNavigator):
         within_m = half.stops_within_m(max(speed_m_s, self._config.speed_m_s))
         share = BACKING if self._backs else AROUND if self._yielding.tries else 1.0
         ahead = reference.ahead(within_m, half.reacts_s)
-        fastest_m_s = half.fastest_m_s(belief.pose, ahead, share, self._to_walls_m)
+        # Where a wall was not where its map has it what it backs out by is what its lasers show.
+        by_map = not (self._backs and self._stops)
+        fastest_m_s = half.fastest_m_s(belief.pose, ahead, share, self._to_walls_m, by_map=by_map)
         if speed_m_s == 0.0:
             reference.rate = 1.0 if fastest_m_s > 0.0 else 0.0
             return
@@ -285,8 +326,9 @@ class ManeuverNavigator(LocalizingNavigator):
             self._lay_out_states(back, self._robot.motion.least_turning_radius_m or 1.0)
             self._backs = True
             self._journal.say(t_s, "back-out", "backs out the way that it came")
-        else:
-            self._goes_around(t_s)
+        elif not self._goes_around(t_s) and self._backs and self._stops:
+            self._backs = False
+            self._think(t_s)
         return STOP
 
     def _goes_around(self, t_s: float) -> bool:

@@ -26,6 +26,8 @@ from pilotage.stack.planning.planner import Planner, Smoother
 
 DISC_HINT = " (for the disc around the robot; navigator maneuver and planner hybrid-astar drive its outline)"
 """Where a disc finds no path, and the body is none."""
+AROUND = ", which it knows no way around (navigators maneuver and goal plan one)"
+"""Of a robot that plans nothing anew, before what stands in its way."""
 TURN_GAIN_PER_S, TURN_RATE_RAD_S = 2.0, 0.8
 """Turned on the spot no faster than this, slower towards the end."""
 

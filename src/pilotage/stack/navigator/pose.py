@@ -10,11 +10,14 @@ from pilotage.core.errors import InputError
 from pilotage.core.types import STOP, Pose2, Twist
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.readings import Readings
+from pilotage.sensors.sensor import Positive
+from pilotage.stack.control.last_word import LastWord
 from pilotage.stack.control.polar_pose import PolarPoseConfig, PolarPoseController
 from pilotage.stack.interface import NAVIGATORS, StackStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.navigator.navigator import (
+    AROUND,
     LocalizingNavigator,
     Parts,
     arrival_within_m,
@@ -28,14 +31,17 @@ class PoseConfig(PolarPoseConfig):
 
     arrival_m: float | None = Field(default=None, gt=0.0)
     """How near it has to believe to be; None: half the goal's tolerance, its error may be the other half."""
+    patience_s: Positive = 20.0
+    """It stands for so long before what its lasers show in its way."""
 
 
 @NAVIGATORS.add("pose", PoseConfig)
 class PoseNavigator(LocalizingNavigator):
     """Drives by the polar law from where it believes to be (rover report, chapter 2).
 
-    Arrives at the first step at which it believes to be near enough. It looks at no
-    obstacle: what lies on its way it drives over.
+    Arrives at the first step at which it believes to be near enough. It knows no way around anything: before
+    what its lasers show in its way it stands, and fails where that stays; what they do not show it drives
+    over.
     """
 
     def __init__(
@@ -55,6 +61,7 @@ class PoseNavigator(LocalizingNavigator):
         pose = Pose2(goal.x_m, goal.y_m, goal.theta_rad)
         self._law = PolarPoseController(config, pose, robot.motion, robot.dt_s)
         self._tolerance_m = arrival_within_m(config.arrival_m, task.goal_tolerance_m)
+        self._last_word, self._patience_s = LastWord(robot), config.patience_s
         self._channel = journal.channel({"distance_to_go_m": "m"})
 
     def step(self, readings: Readings) -> Twist:
@@ -62,10 +69,17 @@ class PoseNavigator(LocalizingNavigator):
         pose = self._localizer.step(readings).pose
         to_go_m = self._law.distance_m(pose.x_m, pose.y_m)
         self._channel.tell(to_go_m)
+        self._last_word.take_in(readings)
         if self._status is not StackStatus.RUNNING:
             return STOP
         if to_go_m <= self._tolerance_m:
             self._end(readings.t_s, StackStatus.ARRIVED, f"within {self._tolerance_m:g} m of the goal")
             return STOP
         twist = self._law.command(pose.x_m, pose.y_m, pose.theta_rad)
-        return twist if math.isfinite(twist.w_rad_s) else STOP
+        if not math.isfinite(twist.w_rad_s):
+            return STOP
+        if self._last_word.allows(twist):
+            return twist
+        if self._last_word.held_s >= self._patience_s:
+            self._end(readings.t_s, StackStatus.FAILED, f"stuck: {self._last_word.why}{AROUND}")
+        return STOP

@@ -24,7 +24,7 @@ class Reference:
 
     def __init__(self, rows: FloatArray, dt_s: float) -> None:
         self._rows, self._dt_s = rows, dt_s
-        self._at, self.rate = 0.0, 1.0
+        self._at, self._before, self.rate = 0.0, 0.0, 1.0
         ahead_m = dt_s * np.abs(rows[::-1, 3]).cumsum()[::-1]
         self._to_go_m = np.append(ahead_m, 0.0)
 
@@ -61,11 +61,16 @@ class Reference:
         """Move on by a step of its clock: (6,) pose, speed, turn rate and the way to go from there."""
         row = self._rows[int(self._at)]
         v, w = self.rate * row[3], self.rate * row[4]
+        self._before = self._at
         self._at = min(self._at + self.rate, float(len(self._rows)))
         if len(self._rows) - self._at < STANDS:
             self._at = float(len(self._rows))
         to_go_m = np.interp(self._at, np.arange(len(self._to_go_m)), self._to_go_m)
         return np.array([*self.pose(), v, w, to_go_m])
+
+    def stay(self) -> None:
+        """Take the last step back: it was not driven. The clock starts anew."""
+        self._at, self.rate = self._before, 0.0
 
     def pose(self) -> FloatArray:
         """(3,) where it is: a row's pose at the end of its step, before the first one the first row's."""

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import math
+
 from pilotage.core.types import STOP, Twist
 from pilotage.sensors.readings import Readings
+from pilotage.stack.control.last_word import LastWord
 from pilotage.stack.control.wander import WanderConfig, Wanderer
 from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.localization.localizer import Abilities, Localizer
 
 LED_S, FREE_S = 15.0, 10.0
 """It is led for so long, then goes where it likes: what stands in the way may be on no map."""
+ELSEWHERE_S = 1.0
+"""Where a laser shows no room it turns for so long before it drives on."""
 
 
 class Wandering:
-    """Wanders by the scanner; without one the robot stands still.
+    """Wanders by the scanner, into nothing that a laser shows; without one the robot stands still.
 
     Attributes
     ----------
@@ -21,9 +26,13 @@ class Wandering:
         When to plan, once it is found.
     """
 
-    def __init__(self, config: WanderConfig, robot: RobotKnowledge, localizer: Localizer) -> None:
-        self._wanderer = Wanderer.of(config, robot)
+    def __init__(
+        self, config: WanderConfig, robot: RobotKnowledge, localizer: Localizer, last_word: LastWord
+    ) -> None:
+        self._wanderer, self._last_word = Wanderer.of(config, robot), last_word
         self._look = Abilities.of(localizer).look_bearing_rad
+        self._turn_rad_s = config.max_turn_rate_rad_s
+        self._elsewhere_until_s = -math.inf
         self.plan_at_s = 0.0
 
     def step(self, readings: Readings) -> Twist:
@@ -32,4 +41,20 @@ class Wandering:
             return STOP
         led = readings.t_s % (LED_S + FREE_S) < LED_S
         bearing = self._look() if led else None
-        return self._wanderer.step(readings, bearing)
+        command = self._wanderer.step(readings, bearing)
+        if readings.t_s >= self._elsewhere_until_s:
+            if self._last_word.allows(command):
+                return command
+            if readings.t_s - self._elsewhere_until_s > ELSEWHERE_S:
+                # Else on in the sense in which it turned: it would waver before what it turns away from.
+                self._turn_rad_s = math.copysign(self._turn_rad_s, command.w_rad_s)
+            self._elsewhere_until_s = readings.t_s + ELSEWHERE_S
+        return self._turns()
+
+    def _turns(self) -> Twist:
+        """On the spot, the other way round where corners have no room for this one; else it stands."""
+        for turn in (Twist(0.0, self._turn_rad_s), Twist(0.0, -self._turn_rad_s)):
+            if self._last_word.allows(turn):
+                self._turn_rad_s = turn.w_rad_s
+                return turn
+        return STOP

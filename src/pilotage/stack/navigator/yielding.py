@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from enum import Enum
 
 import numpy as np
@@ -103,9 +104,9 @@ class Yielding:
         """It left the path: what was driven does not end where it is."""
         self._driven.clear()
 
-    def way_back(self) -> FloatArray:
+    def way_back(self, back_m: float = math.inf) -> FloatArray:
         """(N, 3) the last of what was driven, backwards; none where it cannot back farther."""
-        count = max(2, round(self._config.back_m / SPACING_M) + 1)
+        count = max(2, round(min(back_m, self._config.back_m) / SPACING_M) + 1)
         back = np.array(self._driven[-1 : -count - 1 : -1]).reshape(-1, 3)
         if len(back) < 2:
             self._yields = False

@@ -12,7 +12,8 @@ from pilotage.kernels.geometry import plane
 from pilotage.sensors.readings import Readings
 from pilotage.stack.control.controller import Controller
 from pilotage.stack.control.give_way import GiveWay
-from pilotage.stack.control.guard import ArcGuard, ScanGuard
+from pilotage.stack.control.guard import ArcGuard
+from pilotage.stack.control.last_word import LastWord
 from pilotage.stack.control.make_room import MakeRoom
 from pilotage.stack.control.reactive import Reaction, ReactionKind
 from pilotage.stack.interface import Belief, StackStatus
@@ -113,8 +114,8 @@ class Context:
         self.reactive, self._mapper, self.escape = parts.reactive, parts.mapper, parts.escape
         self.own_map, self.plan = own_map, plan
         self.follower = WaypointFollower(local_planner, controller, robot.dt_s)
-        self.guard, self._scan_guard = ArcGuard(config.guard, robot), ScanGuard(robot)
-        self.wandering = Wandering(config.wander, robot, localizer_of(parts, "goal"))
+        self.guard, self._last_word = ArcGuard(config.guard, robot), LastWord(robot)
+        self.wandering = Wandering(config.wander, robot, localizer_of(parts, "goal"), self._last_word)
         progress_m = config.stall_progress_m
         self.stall = StallWatch(
             progress_m, patience_s(config.stall_s, progress_m, robot.motion.top_speed_m_s)
@@ -137,9 +138,10 @@ class Context:
 
     # --- doing --------------------------------------------------------------------------------------
 
-    def rest(self, t_s: float) -> None:
+    def rest(self, readings: Readings) -> None:
         """Begin a step: nothing is commanded yet."""
-        self.t_s = t_s
+        self.t_s = readings.t_s
+        self._last_word.take_in(readings)
         self.follower.rest()
         self.reaction = NO_REACTION
 
@@ -182,12 +184,12 @@ class Context:
         self.stall.restart(self.t_s)
         return True
 
-    def meets_walls(self, command: Twist, readings: Readings, pose: Pose2) -> bool:
-        """Whether the laser shows no room for a command, whatever the map says; what it shows is mapped."""
-        touched_m = self._scan_guard.touched_m(command, readings)
-        if len(touched_m):
-            self.own_map.show(pose.placed(touched_m))
-        return len(touched_m) > 0
+    def meets_walls(self, command: Twist, pose: Pose2) -> bool:
+        """Whether a laser shows no room for a command, whatever the map says; what it shows is mapped."""
+        if self._last_word.allows(command):
+            return False
+        self.own_map.show(pose.placed(self._last_word.shown_m))
+        return True
 
     @property
     def among_people(self) -> bool:

@@ -81,7 +81,7 @@ def drive(context: Context, state: Driving, readings: Readings, belief: Belief) 
     move = _guarded(context, state, readings, pose)
     if context.waits(move.command, pose):
         return give_way(context, move, pose)
-    if not context.meets_walls(move.command, readings, pose):
+    if not context.meets_walls(move.command, pose):
         return move
     if context.among_people:
         context.follower.hold()

@@ -39,7 +39,7 @@ class MakingRoom:
         context.to_go_m = context.progress.update(pose)
         context.mode = Mode.ESCAPE
         command = context.make_room.step(context.t_s, pose, context.own_map.found_circles_m)
-        if command is None:
+        if command is None or context.meets_walls(command, pose):
             until_s = context.t_s + context.config.give_way.patience_s
             return Move(Waiting(context, self.resumes, until_s), STOP)
         return Move(self, STOP if context.waits(command, pose) else command)
@@ -75,7 +75,8 @@ class Waiting:
         context.mode = Mode.WAIT
         if context.t_s < self.until_s:
             turn = Twist(0.0, context.turn_rate_rad_s if context.may_turn(pose) else 0.0)
-            return Move(self, STOP if context.waits(turn, pose) else turn)
+            stands = context.waits(turn, pose) or context.meets_walls(turn, pose)
+            return Move(self, STOP if stands else turn)
         result = context.make_plan(pose, context.clearances_m(pose))
         if result.path is not None:
             context.take_plan("replan", "the path is free again")
@@ -115,7 +116,10 @@ class Escaping:
         if guard.allows(command, pose, walls, own.known_circles_m, room_m) and guard.corners_may(
             command, pose, walls, own.circles_m
         ):
-            return Move(self, STOP if context.waits(command, pose) else command)
+            if context.waits(command, pose):
+                return Move(self, STOP)
+            if not context.meets_walls(command, pose):
+                return Move(self, command)
         return replan(context, self.resumes, pose, "the way back is blocked")
 
 

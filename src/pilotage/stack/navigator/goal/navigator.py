@@ -100,7 +100,7 @@ class GoalNavigator:
     def step(self, readings: Readings) -> Twist:
         """One control step."""
         belief, state = self._localizer.step(readings), self._state
-        self._context.rest(readings.t_s)
+        self._context.rest(readings)
         if belief.status is BeliefStatus.LOST and not isinstance(state, (Lost, Ended)):
             state = lose(self._context, state)
         self._state, command = state.step(readings, belief)

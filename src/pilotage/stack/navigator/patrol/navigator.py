@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from pilotage.core.errors import InputError
-from pilotage.core.types import Twist
+from pilotage.core.types import STOP, Twist
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.readings import Readings
+from pilotage.stack.control.last_word import LastWord
 from pilotage.stack.interface import NAVIGATORS, Belief, BeliefStatus, StackStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
@@ -74,7 +75,8 @@ class PatrolNavigator:
         if parts.patrol.supply is not None:
             journal.counts["charges"] = 0
         self._context = Context(config, robot, chart, parts.patrol, task.initial.pose, journal)
-        self._wandering = Wandering(config.wander, robot, self._localizer)
+        self._last_word = LastWord(robot)
+        self._wandering = Wandering(config.wander, robot, self._localizer, self._last_word)
         self._state: State | None = None
 
     roadmap = staticmethod(roadmap_for)
@@ -95,6 +97,7 @@ class PatrolNavigator:
     def step(self, readings: Readings) -> Twist:
         """One control step."""
         context = self._context
+        self._last_word.take_in(readings)
         self._tell_mates(context.mates_by_their_words(readings.t_s))
         belief = self._localizer.step(readings)
         lost = belief.status is BeliefStatus.LOST
@@ -127,4 +130,4 @@ class PatrolNavigator:
             len(context.strange),
             *context.alarm,
         )
-        return command
+        return command if self._last_word.allows(command) else STOP

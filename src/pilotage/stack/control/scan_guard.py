@@ -1,0 +1,173 @@
+"""Do not drive into what the lasers show, whatever maps say."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from pilotage.core.types import Command, FloatArray, Pose2, Twist
+from pilotage.kernels.arrays import read_only
+from pilotage.kernels.bodies.beam_contact import touches_an_end
+from pilotage.kernels.geometry.motion import turned_part
+from pilotage.sensors.joint_lidar import JointLidarConfig
+from pilotage.sensors.lidar import LidarConfig
+from pilotage.sensors.readings import LidarScan, Readings
+from pilotage.stack.control.own_motion import OwnMotion
+from pilotage.stack.knowledge import RobotKnowledge
+
+TOUCH_M = 0.01
+"""What a laser shows nearer than this on the way of a command is touched."""
+MOST_PIECES = 100
+"""A metre, within which a robot that is guarded stops."""
+OWN_M = 0.05
+"""An end so much deeper in the outline than a range may be off is the robot's own."""
+PERIODS = 3.0
+"""A scan counts for so many of its laser's periods, where no other comes."""
+EPSILON_S = 1e-9
+NOTHING: FloatArray = np.empty((0, 2))
+
+
+class Scan(NamedTuple):
+    """One scan: until when it counts, its nearest range, and where the robot was (its own frame)."""
+
+    until_s: float
+    nearest_m: float
+    ranges_m: FloatArray
+    at: tuple[float, float, float]
+
+
+class LaserView:
+    """What a laser showed of late."""
+
+    def __init__(self, name: str, sheet: LidarConfig) -> None:
+        self._name, self._valid_s = name, PERIODS / sheet.rate_hz - EPSILON_S
+        angles_rad = sheet.mount.theta_rad + sheet.beam_angles_rad()
+        self.directions = read_only(np.column_stack([np.cos(angles_rad), np.sin(angles_rad)]))
+        self.mount = sheet.mount.x_m, sheet.mount.y_m
+        self._arm_m, self._sure_m = math.hypot(*self.mount), sheet.sure_range_m
+        # The nearest of some returns of a wall is told too near by about two deviations.
+        std_m = math.sqrt(sheet.range_var_m2)
+        self.margin_m, self.own_m = TOUCH_M - 2.0 * std_m, OWN_M + 3.0 * std_m
+        self._scans: list[Scan] = []
+
+    def take_in(self, readings: Readings, here: tuple[float, float, float]) -> None:
+        """A step's scan, and where the robot is now."""
+        t_s, scan = readings.t_s, readings.by_sensor.get(self._name)
+        if self._scans and t_s > self._scans[0].until_s:
+            del self._scans[0]
+        if isinstance(scan, LidarScan):
+            nearest_m = float(np.fmin.reduce(scan.ranges_m, initial=math.inf))
+            self._scans.append(Scan(t_s + self._valid_s, nearest_m, read_only(scan.ranges_m), here))
+
+    def near(self, within_m: float, here: tuple[float, float, float]) -> list[tuple[Scan, float]]:
+        """Scans that may show something so near to where the robot is, and the ranges that it may have."""
+        found = []
+        for scan in self._scans:
+            x, y, _ = scan.at
+            reach_m = min(within_m + self._arm_m + math.hypot(here[0] - x, here[1] - y), self._sure_m)
+            if scan.nearest_m < reach_m:
+                found.append((scan, reach_m))
+        return found
+
+    def ends_m(self, scan: Scan, reach_m: float) -> FloatArray:
+        """(K, 2) ends of what is nearer than ``reach_m``, in the base frame at that time."""
+        near = scan.ranges_m < reach_m
+        return np.asarray(self.mount + scan.ranges_m[near, None] * self.directions[near])
+
+
+class ScanGuard:
+    """Checks the arc of a command, and the stop after it, against what each of the robot's lasers shows.
+
+    Who knows his place badly passes walls by his map that stand elsewhere. What a laser showed counts
+    for three of its periods, as seen from where the robot has moved to since: the edge of a post that is
+    passed is hit by few beams, and a laser may be slower than the robot's steps.
+    Whoever gets no nearer to what he touches, or is about to, may. Where no laser looks it knows nothing, and
+    of what comes up to the robot by itself no more than where it was.
+    """
+
+    def __init__(self, robot: RobotKnowledge) -> None:
+        self._limits, self._footprint = robot.motion, robot.footprint
+        motion = robot.motion
+        self._braking_m_s2 = min(motion.braking_m_s2, motion.top_speed_m_s / robot.dt_s)
+        self._slowing_rad_s2 = min(motion.turn_acceleration_rad_s2, motion.top_turn_rate_rad_s / robot.dt_s)
+        self._reacts_s = robot.dt_s + motion.delay_s
+        # Their joint scan leaves out what the middle between them does not see.
+        self._lasers = [
+            LaserView(name, sheet)
+            for name, sheet in robot.sensors.items()
+            if isinstance(sheet, LidarConfig) and not isinstance(sheet, JointLidarConfig)
+        ]
+        self._motion = OwnMotion(robot)
+        self._t_s, self._here = 0.0, (0.0, 0.0, 0.0)
+
+    def take_in(self, readings: Readings) -> None:
+        """Take in what came in a step; to be called at every one, before commands are asked about."""
+        if not self._lasers:
+            return
+        self._t_s = readings.t_s
+        self._here = turned_part(*self._here, *self._motion.step(readings), 1.0)
+        for laser in self._lasers:
+            laser.take_in(readings, self._here)
+
+    def sent(self, command: Command) -> None:
+        """A command left in this step."""
+        if self._lasers:
+            self._motion.sent(self._t_s, command)
+
+    def touched_m(self, command: Twist) -> FloatArray:
+        """(K, 2) in the base frame what the lasers show around a robot that would touch some of it.
+
+        Of none where it would not.
+        """
+        speed_m_s, w_rad_s = math.hypot(command.v_m_s, command.lateral_m_s), self._can_turn(command)
+        turn_rate = abs(w_rad_s)
+        if speed_m_s == 0.0 and turn_rate == 0.0:
+            return NOTHING
+        # At full speed as far as while it brakes.
+        stops_s = max(speed_m_s / self._braking_m_s2, turn_rate / self._slowing_rad_s2)
+        until_s = self._reacts_s + 0.5 * stops_s
+        corners, radius_m, here = self._footprint.points_m, self._footprint.radius_m, self._here
+        within_m = radius_m + TOUCH_M + speed_m_s * until_s
+        near = [(laser, *found) for laser in self._lasers for found in laser.near(within_m, here)]
+        if not near:
+            return NOTHING
+        # So finely that no corner skips over what is touched.
+        swept_m = (speed_m_s + turn_rate * radius_m) * until_s + TOUCH_M
+        pieces = min(math.ceil(swept_m / TOUCH_M), MOST_PIECES)
+        move = command.v_m_s * until_s, command.lateral_m_s * until_s, w_rad_s * until_s
+        pose = Pose2(*here)
+        if not any(
+            touches_an_end(
+                scan.ranges_m,
+                laser.directions,
+                laser.mount,
+                reach_m,
+                _from(scan.at, pose),
+                move,
+                pieces,
+                corners,
+                radius_m,
+                laser.margin_m,
+                laser.own_m,
+            )
+            for laser, scan, reach_m in near
+        ):
+            return NOTHING
+        return np.concatenate(
+            [pose.seen(Pose2(*scan.at).placed(laser.ends_m(scan, reach_m))) for laser, scan, reach_m in near]
+        )
+
+    def _can_turn(self, command: Twist) -> float:
+        """The turn rate that it makes of a command: wheels do not turn so sharply, nor so fast."""
+        most, least_m = self._limits.top_turn_rate_rad_s, self._limits.least_turning_radius_m
+        if least_m > 0.0:
+            most = min(most, abs(command.v_m_s) / least_m)
+        return min(max(command.w_rad_s, -most), most)
+
+
+def _from(at: tuple[float, float, float], pose: Pose2) -> tuple[float, float, float]:
+    """A pose as it is seen from another one."""
+    seen = Pose2(*at).inverse().compose(pose)
+    return seen.x_m, seen.y_m, seen.theta_rad
