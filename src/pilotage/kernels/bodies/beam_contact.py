@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from pilotage.kernels.arrays import FloatArray
 from pilotage.kernels.bodies.outline import signed_distance
 from pilotage.kernels.geometry.motion import turned_part
@@ -14,15 +16,12 @@ NEARER_M = 1e-9
 
 
 @kernel
-def _away(
-    x: float, y: float, theta: float, px: float, py: float, corners: FloatArray, radius: float, enough: float
-) -> float:
-    """Distance of a point from the outline at a pose, inside negative; exact below ``enough``."""
-    away = math.hypot(px - x, py - y) - radius
-    if corners.shape[0] == 0 or away >= enough:
-        return away
-    c, s = math.cos(theta), math.sin(theta)
-    return signed_distance(c * (px - x) + s * (py - y), c * (py - y) - s * (px - x), corners)
+def _away(pose: FloatArray, px: float, py: float, corners: FloatArray, radius: float) -> float:
+    """Distance of a point from the outline at a pose (x, y, cosine, sine), inside negative."""
+    dx, dy, c, s = px - pose[0], py - pose[1], pose[2], pose[3]
+    if corners.shape[0] == 0:
+        return math.sqrt(dx * dx + dy * dy) - radius  # hypot takes ten times as long
+    return signed_distance(c * dx + s * dy, c * dy - s * dx, corners)
 
 
 @kernel
@@ -63,19 +62,27 @@ def touches_an_end(
     """
     x0, y0, theta0 = start
     ahead, lateral, angle = move
-    swept = math.hypot(ahead, lateral) + radius + margin
+    poses = np.empty((pieces + 1, 4))
+    for i in range(pieces + 1):
+        x, y, theta = turned_part(x0, y0, theta0, ahead, lateral, angle, i / pieces)
+        poses[i] = x, y, math.cos(theta), math.sin(theta)
+    # No point of the outline gets any farther, nor in a piece farther than this.
+    swept = math.hypot(ahead, lateral) + abs(angle) * radius
+    piece = swept / pieces
     for k in range(ranges.shape[0]):
         if not ranges[k] < reach:
             continue
         px, py = mount[0] + ranges[k] * directions[k, 0], mount[1] + ranges[k] * directions[k, 1]
-        if math.hypot(px - x0, py - y0) >= swept:
+        if (px - x0) ** 2 + (py - y0) ** 2 >= (radius + swept + margin) ** 2:
             continue
-        now = _away(x0, y0, theta0, px, py, corners, radius, margin)
-        if now < -own:
+        now = _away(poses[0], px, py, corners, radius)
+        if now < -own or now >= swept + margin:
             continue
         least = min(margin, now - NEARER_M)
-        for i in range(1, pieces + 1):
-            x, y, theta = turned_part(x0, y0, theta0, ahead, lateral, angle, i / pieces)
-            if _away(x, y, theta, px, py, corners, radius, least) < least:
+        i = max(1, math.floor((now - least) / piece))
+        while i <= pieces:
+            away = _away(poses[i], px, py, corners, radius)
+            if away < least:
                 return True
+            i += max(1, math.floor((away - least) / piece))
     return False

@@ -58,8 +58,8 @@ class LaserView:
         if self._scans and t_s > self._scans[0].until_s:
             del self._scans[0]
         if isinstance(scan, LidarScan):
-            nearest_m = float(np.fmin.reduce(scan.ranges_m, initial=math.inf))
-            self._scans.append(Scan(t_s + self._valid_s, nearest_m, read_only(scan.ranges_m), here))
+            nearest_m = float(np.fmin.reduce(scan.ranges_m)) if len(scan.ranges_m) else math.inf
+            self._scans.append(Scan(t_s + self._valid_s, nearest_m, scan.ranges_m, here))
 
     def near(self, within_m: float, here: tuple[float, float, float]) -> list[tuple[Scan, float]]:
         """Scans that may show something so near to where the robot is, and the ranges that it may have."""
@@ -140,7 +140,7 @@ class ScanGuard:
         pose = Pose2(*here)
         if not any(
             touches_an_end(
-                scan.ranges_m,
+                read_only(scan.ranges_m),
                 laser.directions,
                 laser.mount,
                 reach_m,

@@ -295,7 +295,8 @@ class ManeuverNavigator(LocalizingNavigator):
         if self._mapper is not None:
             self._mapper.step(readings, belief)
         half, reference = self._own_half, self._reference
-        half.look(readings, belief, self._own_map.found_circles_m)
+        # What it was shown stands: it leaves it no half of the way.
+        half.look(readings, belief, self._own_map.mapped_circles_m)
         speed_m_s = abs(reference.speed_m_s)
         within_m = half.stops_within_m(max(speed_m_s, self._config.speed_m_s))
         share = BACKING if self._backs else AROUND if self._yielding.tries else 1.0

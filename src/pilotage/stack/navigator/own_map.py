@@ -52,9 +52,14 @@ class OwnMap:
         return had
 
     @property
+    def mapped_circles_m(self) -> FloatArray:
+        """(M, 3) what the mapper added."""
+        return self._shown[:0] if self._mapper is None else self._mapper.circles_m
+
+    @property
     def found_circles_m(self) -> FloatArray:
-        """(M, 3) what the robot put on the map itself."""
-        mapped = self._shown[:0] if self._mapper is None else self._mapper.circles_m
+        """(M, 3) what the robot put on the map itself: the mapper's, and what it was shown."""
+        mapped = self.mapped_circles_m
         if not len(self._shown):
             return mapped
         if mapped is not self._mapped or not len(self._found):
