@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -120,7 +121,7 @@ def test_tables(run: pl.Run) -> None:
     assert errors["ate_rmse_m"] == pytest.approx(float(np.sqrt(np.mean(gap**2))), rel=1e-3)
 
 
-def test_a_team_has_topics_for_each(tmp_path: Path) -> None:
+def test_a_team_has_topics_for_each(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     values = reach(robots=[{"name": "One", "start": {"x_m": 2.0, "y_m": 2.0}}])
     robot = values.pop("robot")
     values["robots"] = [
@@ -137,6 +138,14 @@ def test_a_team_has_topics_for_each(tmp_path: Path) -> None:
         assert same_bits([row.est_x_m for row in rows], run.trace.of(robot_name)["est_x_m"])
     folder = pl.export(run, "tum")
     assert len(list(folder.iterdir())) == 4
+    pytest.importorskip("rerun", reason="needs the extra 'rerun'")
+    capfd.readouterr()
+    pl.export(run, "rerun")
+    (run.folder / "robot-1" / "plans.npz").write_bytes(b"damaged")
+    with pytest.raises(InputError, match=r"robot-1/plans\.npz: expected arrays"):
+        pl.export(run, "rerun")
+    gc.collect()
+    assert not capfd.readouterr().err  # a name of two words and what was not written in the end drew warnings
 
 
 def test_a_rerun_file_holds_every_entity(run: pl.Run) -> None:

@@ -45,22 +45,32 @@ def write_rerun(path: Path, folder: Path) -> None:
     """
     rr = rerun()
     first, whole = read_run(folder), read_trace(folder)
+    team = read_team(folder, first)
     require_times(first.events, folder)
     with draft_of(path) as draft:
         draft.touch()  # where nothing can be written that is told before all the work
         stream = rr.RecordingStream("pilotage", recording_id=shown(folder.name))
         # Rerun's own writer of files waits for ever, now and then, where the disk is full.
         kept = stream.memory_recording()
-        stream.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-        _world(rr, stream, first)
-        for robot, data in enumerate(read_team(folder, first)):
-            name = data.robots[robot] if data.robots else "robot"
-            _robot(rr, stream, data, f"/{name}")
-            _numbers(rr, stream, whole.of(robot), f"/{name}/trace")
-        for event in first.events:
-            stream.set_time(CLOCK, duration=event.t_s)
-            stream.log("/events", rr.TextLog(f"{event.kind}: {event.text}"))
-        draft.write_bytes(kept.drain_as_bytes())
+        try:
+            _run(rr, stream, team, whole)
+        finally:
+            written = kept.drain_as_bytes()  # what is dropped undrained it warns of, in colours
+        draft.write_bytes(written)
+
+
+def _run(rr: Any, stream: Any, team: tuple[RunData, ...], whole: Trace) -> None:
+    first = team[0]
+    stream.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    _world(rr, stream, first)
+    for robot, data in enumerate(team):
+        # Robots may be called "robot 1", or what is no word of a path.
+        name = rr.new_entity_path([data.robots[robot] if data.robots else "robot"])
+        _robot(rr, stream, data, name)
+        _numbers(rr, stream, whole.of(robot), f"{name}/trace")
+    for event in first.events:
+        stream.set_time(CLOCK, duration=event.t_s)
+        stream.log("/events", rr.TextLog(f"{event.kind}: {event.text}"))
 
 
 def _world(rr: Any, stream: Any, data: RunData) -> None:
@@ -139,7 +149,7 @@ def _numbers(rr: Any, stream: Any, trace: Trace, entity: str) -> None:
     for column, values in trace.columns.items():
         if column != "t_s":
             series = rr.Scalars.columns(scalars=values)
-            stream.send_columns(f"{entity}/{column}", indexes=[clock], columns=series)
+            stream.send_columns(entity + rr.new_entity_path([column]), indexes=[clock], columns=series)
 
 
 def _clock(rr: Any, t_s: FloatArray) -> Any:
