@@ -31,7 +31,7 @@ NO_DISCS = np.zeros((0, 3))
 AHEAD = [0.37, -3.0, 0.37, 3.0]
 BESIDE, POST = [-3.0, 0.306, 3.0, 0.306], [-0.002, 0.3, 0.002, 0.3]
 AHEAD_M_S, BACK_M_S = Twist(0.5, 0.0), Twist(-0.5, 0.0)
-ALL_ROUND = LidarConfig(beams=720, field_of_view_rad=2.0 * math.pi)
+ALL_ROUND = LidarConfig(beams=2880, field_of_view_rad=2.0 * math.pi)
 
 
 def scan_of(sheet: LidarConfig, *walls: list[float]) -> LidarScan:
@@ -100,6 +100,29 @@ def test_what_is_touched_already_says_nothing_of_what_is_ahead() -> None:
     assert along.allows(Twist(0.3, -1.5))
     assert not along.allows(Twist(0.3, 1.5))
     assert not along.allows(Twist(0.0, 0.0, 0.3))
+
+
+@pytest.mark.parametrize(("beams", "field_rad"), [(720, 2.0 * math.pi), (90, 2.0 * math.pi), (181, math.pi)])
+def test_what_one_beam_alone_sees_is_dust(beams: int, field_rad: float) -> None:
+    """Wrong by the way, two of a hundred ranges ended a run: one near the robot in each scan kept it."""
+    sheet = LidarConfig(beams=beams, field_of_view_rad=field_rad)
+    ahead = int(np.argmin(np.abs(sheet.beam_angles_rad())))
+
+    def allows(near: list[int]) -> bool:
+        ranges_m = np.full(beams, 3.0)
+        ranges_m[near] = 0.35
+        return hears(word_of({"lidar": sheet}), 0.1, lidar=LidarScan(ranges_m)).allows(AHEAD_M_S)
+
+    assert allows([ahead])
+    assert allows([ahead - 5, ahead, ahead + 5])
+    assert not allows([ahead, ahead + 1])
+    assert not allows([ahead - 1, ahead + 1])  # the one between measured nothing, or something else
+
+
+def test_of_a_laser_without_beams_beside_each_other_each_is_believed() -> None:
+    sheet = LidarConfig(beams=3, field_of_view_rad=math.pi)
+    word = hears(word_of({"lidar": sheet}), 0.1, lidar=LidarScan(np.array([3.0, 0.35, 3.0])))
+    assert not word.allows(AHEAD_M_S)
 
 
 def test_each_laser_is_heeded_where_it_sits() -> None:

@@ -6,13 +6,50 @@ import math
 
 import numpy as np
 
-from pilotage.kernels.arrays import FloatArray
+from pilotage.kernels.arrays import BoolArray, FloatArray
 from pilotage.kernels.bodies.outline import signed_distance
 from pilotage.kernels.geometry.motion import turned_part
 from pilotage.kernels.jit import kernel
 
 NEARER_M = 1e-9
 """Turned about its axle a disc is where it was but for rounding."""
+
+NEIGHBOURS, BESIDE = 2, 0.5
+"""Beams to either side that confirm an end, if they look in about its direction: the cosine of 60 degrees."""
+SAME_M, SAME_BEAMS = 0.1, 3.0
+"""Ends so near to each other, or of so many times the distance between their beams, are of one thing."""
+
+
+@kernel
+def _is_confirmed(k: int, ranges: FloatArray, directions: FloatArray) -> bool:
+    """Whether a beam beside it ends where it does: what one beam alone sees is dust, or a wrong reading.
+
+    Of a laser that has no beams beside each other each is believed.
+    """
+    count, alone = ranges.shape[0], True
+    for off in range(-NEIGHBOURS, NEIGHBOURS + 1):
+        j = (k + off) % count
+        if j == k:
+            continue
+        cosine = directions[k, 0] * directions[j, 0] + directions[k, 1] * directions[j, 1]
+        if cosine < BESIDE:
+            continue
+        alone = False
+        one, other = ranges[k], ranges[j]
+        apart = one * one + other * other - 2.0 * one * other * cosine
+        beams = 2.0 * one * one * (1.0 - cosine)
+        if apart <= max(SAME_M**2, SAME_BEAMS**2 * beams):
+            return True
+    return alone
+
+
+@kernel
+def confirmed_ends(ranges: FloatArray, directions: FloatArray, reach: float) -> BoolArray:
+    """(N,) which beams end nearer than ``reach``, confirmed by one beside them."""
+    found = np.zeros(ranges.shape[0], np.bool_)
+    for k in range(ranges.shape[0]):
+        found[k] = ranges[k] < reach and _is_confirmed(k, ranges, directions)
+    return found
 
 
 @kernel
@@ -38,7 +75,7 @@ def touches_an_end(
     margin: float,
     own: float,
 ) -> bool:
-    """Whether some end of a beam comes nearer than ``margin``, and nearer than it is, on a move.
+    """Whether a confirmed end of a beam comes nearer than ``margin``, and nearer than it is, on a move.
 
     Each end is judged by itself: one that is near already, and gets no nearer, says nothing of the others.
     Deep in the outline nothing stands: what seems to is the robot itself, or dirt on the laser.
@@ -83,6 +120,8 @@ def touches_an_end(
         while i <= pieces:
             away = _away(poses[i], px, py, corners, radius)
             if away < least:
-                return True
+                if _is_confirmed(k, ranges, directions):
+                    return True
+                break
             i += max(1, math.floor((away - least) / piece))
     return False

@@ -9,7 +9,7 @@ import numpy as np
 
 from pilotage.core.types import Command, FloatArray, Pose2, Twist
 from pilotage.kernels.arrays import read_only
-from pilotage.kernels.bodies.beam_contact import touches_an_end
+from pilotage.kernels.bodies.beam_contact import confirmed_ends, touches_an_end
 from pilotage.kernels.geometry.motion import turned_part
 from pilotage.sensors.joint_lidar import JointLidarConfig
 from pilotage.sensors.lidar import LidarConfig
@@ -73,7 +73,7 @@ class LaserView:
 
     def ends_m(self, scan: Scan, reach_m: float) -> FloatArray:
         """(K, 2) ends of what is nearer than ``reach_m``, in the base frame at that time."""
-        near = scan.ranges_m < reach_m
+        near = confirmed_ends(scan.ranges_m, self.directions, reach_m)
         return np.asarray(self.mount + scan.ranges_m[near, None] * self.directions[near])
 
 
