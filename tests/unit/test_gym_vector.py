@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from typing import Any
 
@@ -22,7 +23,7 @@ def registered() -> None:
     gym.register()
 
 
-def many(mission: Any = "museum-1", count: int = 3, **options: Any) -> Any:
+def many(mission: Any = "museum-1", count: Any = 3, **options: Any) -> Any:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # Gymnasium is not sure of vector entry points
         return gymnasium.make_vec(
@@ -105,3 +106,31 @@ def test_observations_are_of_their_spaces() -> None:
 def test_what_cannot_be_stepped_at_once_is_refused(mission: Any, told: str) -> None:
     with pytest.raises(InputError, match=told):
         many(mission)
+
+
+def test_numbers_that_no_environments_have_are_refused() -> None:
+    for count, told in ((1.5, "a whole number >= 1, found 1.5"), (10**9, "at most .* found 1000000000")):
+        with pytest.raises(InputError, match=f"num_envs: expected {told}"):
+            many(count=count)
+    with pytest.raises(InputError, match="seed: expected a whole number, found nan"):
+        many(count=2).reset(seed=math.nan)
+
+
+@pytest.mark.parametrize(
+    ("action", "told"),
+    [
+        (np.full((2, 2), np.nan), "from -1 to 1, found NaN"),
+        (np.zeros(2), r"shape \(2, 2\), found shape \(2,\)"),
+        ([["a", "b"]] * 2, "expected numbers of shape"),
+    ],
+)
+def test_actions_that_are_none_are_refused_alone_and_among_many(action: Any, told: str) -> None:
+    """NaN, as of a policy that has diverged, would be a robot that is nowhere from then on."""
+    env = many(count=2)
+    env.reset(seed=0)
+    with pytest.raises(InputError, match=told):
+        env.step(action)
+    one = gymnasium.make("pilotage/museum-1-v0").unwrapped
+    one.reset(seed=0)
+    with pytest.raises(InputError, match="gymnasium: action: expected numbers"):
+        one.step(action[0])

@@ -11,6 +11,8 @@ import pytest
 from scipy.io import savemat
 
 from pilotage.experiments.recordings.localize import localize_log
+from pilotage.experiments.recordings.reading import read_drive
+from pilotage.sensors.sensor import Mount
 from support.laser_drives import QUIET, FloatArray, LaserEvents, laser_drive
 
 SEEDS = (0, 1)
@@ -82,3 +84,13 @@ def test_ranges_that_err_slowly_do_not_make_it_sure_of_itself(tmp_path: Path, se
     found, _ = localized(tmp_path, LaserEvents(range_error_std_m=0.03), seed)
     assert number(found, "position_rmse_m") <= 0.05
     assert 1.5 <= number(found, "nees_mean") <= 6.0
+
+
+def test_a_laser_that_sits_next_to_nowhere_sits_in_the_robots_origin(tmp_path: Path) -> None:
+    """Settings refuse 1e-300 as no quantity; a recording of it ended in a traceback."""
+    values = laser_drive(rows=200)
+    savemat(tmp_path / "drive.mat", values | {"d": np.array([[1e-300]])})
+    drive = read_drive(tmp_path / "drive.mat", "aer1513", None)
+    assert drive.sensors["beacons"].mount == Mount()
+    turned = Mount.measured(0.1, -1e-300, 5e-324)
+    assert turned == Mount(x_m=0.1)

@@ -11,6 +11,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from pilotage.bridges.gym_action import shares_of
 from pilotage.bridges.gym_observation import LastWords, Observation, numbers_of_sensors
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.errors import InputError
@@ -104,7 +105,7 @@ class MissionEnv(gymnasium.Env[Any, Any]):
         """Drive one time step."""
         if self._sim is None:
             raise InputError("gymnasium: expected reset() before the first step, found none")
-        shares = np.clip(np.asarray(action, dtype=np.float64).reshape(self._top.shape), -1.0, 1.0)
+        shares = shares_of(action, *self._top.shape)
         twist = Twist(*(shares * self._top).tolist())
         readings = self._sim.step(twist)
         observation = self._observed(readings)

@@ -14,7 +14,9 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from pilotage.bridges.gym_action import shares_of
 from pilotage.bridges.gym_env import A_STEP, HIT, LARGEST_SEED, REACHED, goal_of
+from pilotage.core import given
 from pilotage.core.errors import InputError
 from pilotage.experiments.build.build import build_source
 from pilotage.experiments.build.robots import sensors_of
@@ -26,6 +28,8 @@ from pilotage.sensors.numbers import FARTHEST_M
 from pilotage.sim.sensing.lidar import fan_of
 
 Observations = dict[str, NDArray[np.float32]]
+MOST_BEAMS = 50_000_000
+"""Of all environments together; each takes some 20 bytes."""
 
 
 class MissionVectorEnv(VectorEnv[Any, Any, Any]):
@@ -66,8 +70,8 @@ class MissionVectorEnv(VectorEnv[Any, Any, Any]):
         set: Mapping[str, Any] | None = None,  # noqa: A002 - as the command line calls it
         threads: int | None = None,
     ) -> None:
-        if num_envs < 1:
-            raise InputError(f"gymnasium: expected num_envs of 1 or more, found {num_envs}")
+        num_envs = given.whole("gymnasium: num_envs", num_envs, 1)
+        threads = None if threads is None else given.whole("gymnasium: threads", threads, 1)
         self.mission = load(mission, set=set)
         goal = goal_of(self.mission)
         source = build_source(self.mission).simulator
@@ -81,6 +85,11 @@ class MissionVectorEnv(VectorEnv[Any, Any, Any]):
         if not lidars or lidars[0][1].every_steps(dt_s, "robot.sensors") != 1:
             raise InputError(f"gymnasium: expected a lidar of {1.0 / dt_s:g} Hz where many are stepped")
         self._lidar, lidar = lidars[0]
+        if num_envs * lidar.beams > MOST_BEAMS:
+            raise InputError(
+                f"gymnasium: num_envs: expected at most {MOST_BEAMS // lidar.beams} with {lidar.beams} beams "
+                f"each, found {num_envs}"
+            )
         motion = _motion(self.mission)
         self.num_envs = num_envs
         low, high = np.array([0.0, -np.pi], np.float32), np.array([FARTHEST_M, np.pi], np.float32)
@@ -131,7 +140,9 @@ class MissionVectorEnv(VectorEnv[Any, Any, Any]):
         """Begin anew, with noise of that seed; without one it goes on."""
         del options
         if isinstance(seed, list):
-            seed = seed[0]
+            seed = seed[0] if seed else None
+        if seed is not None and not isinstance(seed, int | np.integer):
+            raise InputError(f"gymnasium: seed: expected a whole number, found {given.told(seed)}")
         super().reset(seed=None if seed is None else int(seed) % LARGEST_SEED)
         self._over[:] = True
         self._advance()
@@ -141,8 +152,7 @@ class MissionVectorEnv(VectorEnv[Any, Any, Any]):
         self, actions: Any
     ) -> tuple[Observations, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
         """Drive every robot one time step."""
-        shares = np.asarray(actions, dtype=np.float64).reshape(self.num_envs, 2)
-        np.multiply(np.clip(shares, -1.0, 1.0), self._top, out=self._commands)
+        np.multiply(shares_of(actions, self.num_envs, 2), self._top, out=self._commands)
         self._advance()
         return self._observed(), self._reward.copy(), self._ended.copy(), self._late.copy(), {}
 

@@ -8,7 +8,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from pilotage.core.config import Config
+from pilotage.core.config import SMALLEST, Config
 from pilotage.core.errors import InputError
 from pilotage.core.registry import Registry
 from pilotage.core.types import FloatArray, Pose2
@@ -26,6 +26,12 @@ class Mount(Config):
     x_m: float = 0.0
     y_m: float = 0.0
     theta_rad: float = Field(default=0.0, ge=-math.pi, le=math.pi)
+
+    @classmethod
+    def measured(cls, x_m: float, y_m: float = 0.0, theta_rad: float = 0.0) -> Mount:
+        """As a recording tells it: 1e-300 m, which no file of settings may hold, is nothing."""
+        x_m, y_m, theta_rad = (0.0 if abs(v) < SMALLEST else v for v in (x_m, y_m, theta_rad))
+        return cls(x_m=x_m, y_m=y_m, theta_rad=theta_rad)
 
     @property
     def pose(self) -> Pose2:

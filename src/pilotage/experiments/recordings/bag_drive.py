@@ -332,10 +332,10 @@ def _sheet(laser: LaserLog) -> LidarConfig:
     reach = min(laser.range_max_m, LARGEST_RANGE_M, float(measured.max(initial=1.0)) + 1.0)
     middle = first + 0.5 * view if beams > 1 else first
     return LidarConfig(
-        mount=Mount(
-            x_m=laser.mount.x_m,
-            y_m=laser.mount.y_m,
-            theta_rad=float(wrap_array_to_pi(np.array([laser.mount.theta_rad + middle]))[0]),
+        mount=Mount.measured(
+            laser.mount.x_m,
+            laser.mount.y_m,
+            float(wrap_array_to_pi(np.array([laser.mount.theta_rad + middle]))[0]),
         ),
         beams=beams,
         field_of_view_rad=view,

@@ -246,7 +246,7 @@ def aer1513_drive(path: Path, max_range_m: float | None = None) -> RecordedDrive
         {
             ODOMETRY: driving,
             BEACONS: BeaconConfig(
-                mount=Mount(x_m=log.laser_ahead_m),
+                mount=Mount.measured(log.laser_ahead_m),
                 field_of_view_rad=2.0 * np.pi,
                 max_range_m=100.0,
                 range_var_m2=log.range_var_m2,
