@@ -71,3 +71,38 @@ def test_who_knows_its_place_by_satellites_gets_on_though_its_estimate_jumps(see
     metrics = run_mission(mission_of(read_mission("car-park"), (), seed, settings), save=False).metrics
     assert metrics["success"], metrics["reason"]
     assert int(str(metrics["replans"])) > 8
+
+
+@pytest.mark.parametrize("seed", [8, 11, 12])
+def test_alone_on_its_floor_it_gives_way_to_who_walks(seed: int) -> None:
+    """Who walks comes farther than his half of the way while it brakes: it ran into every third."""
+    walls = [[0, 0, 12, 0], [12, 0, 12, 9], [12, 9, 0, 9], [0, 9, 0, 0]]
+    looks = {"name": "lidar", "beams": 360, "field_of_view_rad": 4.712, "max_range_m": 10.0}
+    values = {
+        "mission": "among-walkers",
+        "world": {
+            "map": {"map": "hall", "bounds_m": [0, 0, 12, 9], "walls_m": walls},
+            "start": {"x_m": 1.0, "y_m": 4.5, "theta_rad": 0.0},
+            "goal": {"x_m": 11.0, "y_m": 4.5, "tolerance_m": 0.3},
+            "people": [{"name": "social-force", "count": 5}],
+        },
+        "robot": {
+            "footprint": {"points_m": [[0.4, 0.25], [-0.3, 0.25], [-0.3, -0.25], [0.4, -0.25]]},
+            "motion": {"name": "differential-drive", "max_speed_m_s": 0.8},
+            "sensors": {
+                "odometry": {"name": "wheel-odometry"},
+                "front": looks | {"mount": {"x_m": 0.35, "y_m": -0.2, "theta_rad": -0.7}},
+                "back": looks | {"mount": {"x_m": -0.25, "y_m": 0.2, "theta_rad": 2.44}},
+            },
+        },
+        "stack": {
+            "initial": {"x_var_m2": 1e-4, "y_var_m2": 1e-4, "theta_var_rad2": 1e-4},
+            "localizer": "ekf-walls",
+            "navigator": "maneuver",
+            "planner": "hybrid-astar",
+        },
+        "run": {"time_limit_s": 120.0},
+    }
+    metrics = run_mission(mission_of(values, seed=seed), save=False).metrics
+    assert metrics["collisions"] == 0
+    assert metrics["success"], metrics["reason"]

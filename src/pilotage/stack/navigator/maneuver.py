@@ -15,6 +15,7 @@ from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.readings import Readings
 from pilotage.sensors.sensor import Positive
 from pilotage.stack.control.controller import Controller
+from pilotage.stack.control.give_way import GiveWay, GiveWayConfig
 from pilotage.stack.control.kanayama import KanayamaConfig, KanayamaController
 from pilotage.stack.control.last_word import LastWord
 from pilotage.stack.control.own_half import OwnHalf, OwnHalfConfig
@@ -36,6 +37,7 @@ from pilotage.stack.navigator.reference import STANDS, Reference
 from pilotage.stack.navigator.timed_path import laid_out, with_turns
 from pilotage.stack.navigator.trail import Trail
 from pilotage.stack.navigator.yielding import Act, Yielding, YieldingConfig
+from pilotage.stack.perception.moving_bodies import MovingBodies, MovingBodiesConfig
 from pilotage.stack.planning.outline import car_of, ground_of
 from pilotage.stack.planning.plan_status import PlanStatus
 from pilotage.stack.planning.planner import Path, PlanResult
@@ -79,6 +81,9 @@ class ManeuverConfig(Config):
     """How near it comes to what its laser sees and its map does not explain."""
     yielding: YieldingConfig = YieldingConfig()
     """What it does where that stays in its way."""
+    moving_bodies: MovingBodiesConfig = MovingBodiesConfig()
+    give_way: GiveWayConfig = GiveWayConfig()
+    """Alone on its floor it gives way to who walks; mates each stop in their own half."""
 
 
 @NAVIGATORS.add("maneuver", ManeuverConfig)
@@ -88,7 +93,8 @@ class ManeuverNavigator(LocalizingNavigator):
     A robot that turns on the spot does so at the path's corners, so that it drives the very lines of a sweep.
 
     It drives no faster than lets it stop, along its path and with its outline, on its own half of the way to
-    whatever its laser sees that is on no map: team mates, people, things. Where that stays in the way it
+    whatever its laser sees that is on no map: team mates, people, things. Without mates on its floor it gives
+    way to who walks, who comes farther than his half. Where that stays in the way it
     plans around it, or backs out of the way that it came. Where it cannot keep up with the plan it plans
     anew; what a path that covers a floor left of it, as far as the robot knows, is driven in the end. Lost,
     it stands.
@@ -119,6 +125,10 @@ class ManeuverNavigator(LocalizingNavigator):
         car = car_of(robot.footprint, WALL_M, 1.0)
         walls = car, ground_of(chart.field, car)
         self._own_half = OwnHalf(config.own_half, robot, chart, unexplained_of(parts), walls)
+        self._bodies = MovingBodies(
+            config.moving_bodies, robot, chart, minds=not task.mates, unexplained=unexplained_of(parts)
+        )
+        self._gives_way = GiveWay(config.give_way, robot, self._bodies)
         self._yielding = Yielding(config.yielding, robot.dt_s, robot.streams.stream("yielding"))
         rng = robot.streams.stream("planner")
         self._plan = GlobalPlan(
@@ -244,11 +254,14 @@ class ManeuverNavigator(LocalizingNavigator):
             return self._astray(readings.t_s)
         rate = self._reference.rate
         command = STOP if rate == 0.0 else self._toward(pose, Pose2(x, y, theta), Twist(v, w))
-        if not self._last_word.allows(command):
+        waits = not self._gives_way.allows(command, pose, self._own_map.mapped_circles_m)
+        if not waits and not self._last_word.allows(command):
             shown_m = pose.placed(self._last_word.shown_m)
-            if not self._own_half.sees(shown_m):
-                return self._stops_short(readings.t_s, shown_m)
             # What no map explains may go by itself: as before all that it heeds it waits.
+            waits = self._own_half.sees(shown_m)
+            if not waits:
+                return self._stops_short(readings.t_s, shown_m)
+        if waits:
             self._reference.stay()
             (x, y, theta), rate, command = there.tolist(), 0.0, STOP
         act = self._yielding.step(rate, rate * abs(speed_m_s) * self._robot.dt_s, backs=self._backs)
@@ -292,8 +305,9 @@ class ManeuverNavigator(LocalizingNavigator):
 
     def _heed(self, readings: Readings, belief: Belief) -> None:
         """Let the reference's clock run as fast as what the laser sees leaves room for."""
+        for_map = self._bodies.step(readings, belief)
         if self._mapper is not None:
-            self._mapper.step(readings, belief)
+            self._mapper.step(for_map, belief)
         half, reference = self._own_half, self._reference
         # What it was shown stands: it leaves it no half of the way.
         half.look(readings, belief, self._own_map.mapped_circles_m)
