@@ -63,12 +63,12 @@ class LaserView:
 
     def near(self, within_m: float, here: tuple[float, float, float]) -> list[tuple[Scan, float]]:
         """Scans that may show something so near to where the robot is, and the ranges that it may have."""
-        found = []
+        found, sure_m = [], self._sure_m
         for scan in self._scans:
             x, y, _ = scan.at
-            reach_m = min(within_m + self._arm_m + math.hypot(here[0] - x, here[1] - y), self._sure_m)
-            if scan.nearest_m < reach_m:
-                found.append((scan, reach_m))
+            reach_m = within_m + self._arm_m + math.hypot(here[0] - x, here[1] - y)
+            if scan.nearest_m < reach_m and scan.nearest_m < sure_m:
+                found.append((scan, min(reach_m, sure_m)))
         return found
 
     def ends_m(self, scan: Scan, reach_m: float) -> FloatArray:
@@ -88,7 +88,8 @@ class ScanGuard:
     """
 
     def __init__(self, robot: RobotKnowledge) -> None:
-        self._limits, self._footprint = robot.motion, robot.footprint
+        self._limits = robot.motion
+        self._corners_m, self._radius_m = robot.footprint.points_m, robot.footprint.radius_m
         motion = robot.motion
         self._braking_m_s2 = min(motion.braking_m_s2, motion.top_speed_m_s / robot.dt_s)
         self._slowing_rad_s2 = min(motion.turn_acceleration_rad_s2, motion.top_turn_rate_rad_s / robot.dt_s)
@@ -127,34 +128,33 @@ class ScanGuard:
             return NOTHING
         # At full speed as far as while it brakes.
         stops_s = max(speed_m_s / self._braking_m_s2, turn_rate / self._slowing_rad_s2)
-        until_s = self._reacts_s + 0.5 * stops_s
-        corners, radius_m, here = self._footprint.points_m, self._footprint.radius_m, self._here
-        within_m = radius_m + TOUCH_M + speed_m_s * until_s
+        until_s, here = self._reacts_s + 0.5 * stops_s, self._here
+        within_m = self._radius_m + TOUCH_M + speed_m_s * until_s
         near = [(laser, *found) for laser in self._lasers for found in laser.near(within_m, here)]
         if not near:
             return NOTHING
         # So finely that no corner skips over what is touched.
-        swept_m = (speed_m_s + turn_rate * radius_m) * until_s + TOUCH_M
+        swept_m = (speed_m_s + turn_rate * self._radius_m) * until_s + TOUCH_M
         pieces = min(math.ceil(swept_m / TOUCH_M), MOST_PIECES)
         move = command.v_m_s * until_s, command.lateral_m_s * until_s, w_rad_s * until_s
-        pose = Pose2(*here)
-        if not any(
-            touches_an_end(
-                read_only(scan.ranges_m),
+        for laser, scan, reach_m in near:
+            if touches_an_end(
+                scan.ranges_m,
                 laser.directions,
                 laser.mount,
                 reach_m,
-                _from(scan.at, pose),
+                _since(scan.at, here),
                 move,
                 pieces,
-                corners,
-                radius_m,
+                self._corners_m,
+                self._radius_m,
                 laser.margin_m,
                 laser.own_m,
-            )
-            for laser, scan, reach_m in near
-        ):
+            ):
+                break
+        else:
             return NOTHING
+        pose = Pose2(*here)
         return np.concatenate(
             [pose.seen(Pose2(*scan.at).placed(laser.ends_m(scan, reach_m))) for laser, scan, reach_m in near]
         )
@@ -167,7 +167,7 @@ class ScanGuard:
         return min(max(command.w_rad_s, -most), most)
 
 
-def _from(at: tuple[float, float, float], pose: Pose2) -> tuple[float, float, float]:
-    """A pose as it is seen from another one."""
-    seen = Pose2(*at).inverse().compose(pose)
-    return seen.x_m, seen.y_m, seen.theta_rad
+def _since(at: tuple[float, float, float], here: tuple[float, float, float]) -> tuple[float, float, float]:
+    """Where it is now, seen from where it was."""
+    dx, dy, cosine, sine = here[0] - at[0], here[1] - at[1], math.cos(at[2]), math.sin(at[2])
+    return cosine * dx + sine * dy, cosine * dy - sine * dx, here[2] - at[2]

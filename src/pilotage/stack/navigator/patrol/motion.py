@@ -132,7 +132,8 @@ class Motion:
         lane_m *= min(1.0, self.to_go_s / MERGE_S)
         self.blocked = self.taken = False
         beside, still = self._beside(), self.standing
-        around_m, body_m = self._clearance_m, self.body_m
+        # A path nearer to what may move than commands may come is crept along.
+        around_m, body_m = self.shut_m - senses.radius_m, self.body_m
         discs = _discs(senses.on_map(beside), around_m) if len(beside) and not first else NO_DISCS
         if len(still):
             discs = np.concatenate([discs, _discs(still, body_m)])

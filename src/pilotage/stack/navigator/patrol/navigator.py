@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pilotage.core.errors import InputError
-from pilotage.core.types import STOP, Twist
+from pilotage.core.types import Twist
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.readings import Readings
 from pilotage.stack.control.last_word import LastWord
@@ -97,12 +97,13 @@ class PatrolNavigator:
     def step(self, readings: Readings) -> Twist:
         """One control step."""
         context = self._context
-        self._last_word.take_in(readings)
         self._tell_mates(context.mates_by_their_words(readings.t_s))
         belief = self._localizer.step(readings)
         lost = belief.status is BeliefStatus.LOST
         context.sense(readings, belief, lost=lost)
         state, astray = self._state, lost or context.is_off_roadmap()
+        if astray:
+            self._last_word.take_in(readings)  # else each of its commands leaves it room to stop anyway
         if astray and not isinstance(state, Lost):
             what = "does not know where it is" if lost else "finds no path from where it is"
             context.say("lost", f"the robot {what}: wandering until it does")
@@ -130,4 +131,4 @@ class PatrolNavigator:
             len(context.strange),
             *context.alarm,
         )
-        return command if self._last_word.allows(command) else STOP
+        return command
