@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import shutil
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -265,6 +266,24 @@ def test_an_event_without_a_time_has_no_place_in_a_recording(
     with pytest.raises(InputError, match="expected the time of every event"):
         pl.export(str(folder), to, tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(("file", "array"), [("plans.npz", "t_0"), ("scans.npz", "scan_t_s")])
+def test_a_time_that_no_recording_holds_is_one_line(
+    run: pl.Run, tmp_path: Path, file: str, array: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """32 bits of seconds; bags and Rerun overflowed."""
+    shutil.copytree(run.folder, tmp_path / "run")
+    with np.load(run.folder / file) as kept:
+        arrays = dict(kept)
+    arrays[array] = np.full_like(arrays[array], 1e15)
+    np.savez(tmp_path / "run" / file, **arrays)
+    for to in ("mcap", "rosbag", "rerun"):
+        assert main(["export", str(tmp_path / "run"), "--to", to, "--out", str(tmp_path / to)]) == 2
+        said = capsys.readouterr().err
+        assert said.count("\n") == 1
+        assert f"{file}: " in said
+        assert f"{array}: expected" in said
 
 
 @pytest.mark.parametrize("form", sorted(FORMS))

@@ -12,6 +12,7 @@ import numpy as np
 
 from pilotage.core.types import FloatArray
 from pilotage.records.arrays import Arrays, read_record, write_arrays
+from pilotage.records.events import LATEST_S
 from pilotage.records.numbers import FARTHEST_M
 
 PLANS_FILE = "plans.npz"
@@ -77,11 +78,14 @@ def _plans(arrays: Arrays) -> Plans:
 
 
 def _plan(arrays: Arrays, i: int) -> Plan:
+    t_s = arrays.scalar(f"t_{i}", np.nan)
+    if abs(t_s) > LATEST_S:
+        raise ValueError(f"t_{i}: expected a time within {LATEST_S} s")
     return Plan(
         path=places(arrays, f"path_{i}", (3, 2)),
         waypoints=places(arrays, f"waypoints_{i}", (3, 2)),
         tree=places(arrays, f"tree_{i}", (4,)),
-        t_s=arrays.scalar(f"t_{i}", np.nan),
+        t_s=t_s,
         length_m=arrays.scalar(f"length_{i}", np.nan),
         planning_time_s=arrays.scalar(f"planning_time_{i}", np.nan),
         clearance_m=arrays.scalar(f"clearance_{i}", np.nan),

@@ -11,6 +11,7 @@ import numpy as np
 
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.records.arrays import Arrays, read_record, write_arrays
+from pilotage.records.events import LATEST_S
 from pilotage.records.numbers import FARTHEST_M
 
 SCANS_FILE = "scans.npz"
@@ -117,6 +118,8 @@ def _scans(arrays: Arrays) -> Sightings:
     mount, resolution_m = arrays.floats("scan_mount", 3), arrays.scalar("scan_resolution_m")
     if not all(np.isfinite(at).all() and (np.diff(at) >= 0.0).all() for at in (t_s, odometry[:, 0])):
         raise ValueError("expected scans in the order of time")
+    if not (np.abs(t_s) <= LATEST_S).all():
+        raise ValueError(f"scan_t_s: expected times within {LATEST_S} s")
     if not (np.abs(mount) <= FARTHEST_M).all() or not np.isfinite(angles_rad).all():
         raise ValueError("scan_mount, scan_angles_rad: expected finite numbers")
     if not (np.isnan(poses) | (np.abs(poses) <= FARTHEST_M)).all():
