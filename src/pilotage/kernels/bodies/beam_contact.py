@@ -11,6 +11,8 @@ from pilotage.kernels.bodies.outline import signed_distance
 from pilotage.kernels.geometry.motion import turned_part
 from pilotage.kernels.jit import kernel
 
+BESIDE = 2
+"""Beams on each side."""
 NEARER_M = 1e-9
 """Turned about its axle a disc is where it was but for rounding."""
 
@@ -22,6 +24,17 @@ def _away(pose: FloatArray, px: float, py: float, corners: FloatArray, radius: f
     if corners.shape[0] == 0:
         return math.sqrt(dx * dx + dy * dy) - radius  # hypot takes ten times as long
     return signed_distance(c * dx + s * dy, c * dy - s * dx, corners)
+
+
+@kernel
+def _range_of(ranges: FloatArray, k: int, same: float) -> float:
+    """A beam's range, averaged over those beside it that end at the same surface: each has its own noise."""
+    total, count = 0.0, 0
+    for i in range(max(k - BESIDE, 0), min(k + BESIDE + 1, ranges.shape[0])):
+        if abs(ranges[i] - ranges[k]) <= same:
+            total += ranges[i]
+            count += 1
+    return total / count
 
 
 @kernel
@@ -37,6 +50,7 @@ def touches_an_end(
     radius: float,
     margin: float,
     own: float,
+    same: float,
 ) -> bool:
     """Whether some end of a beam comes nearer than ``margin``, and nearer than it is, on a move.
 
@@ -59,6 +73,8 @@ def touches_an_end(
         (K, 2) of a polygon, none of a disc; of the disc around the axle that holds it.
     own
         Deeper in the outline than this is deep.
+    same
+        Ranges of neighbours that differ by no more are of one surface.
     """
     x0, y0, theta0 = start
     ahead, lateral, angle = move
@@ -72,7 +88,8 @@ def touches_an_end(
     for k in range(ranges.shape[0]):
         if not ranges[k] < reach:
             continue
-        px, py = mount[0] + ranges[k] * directions[k, 0], mount[1] + ranges[k] * directions[k, 1]
+        away = _range_of(ranges, k, same)
+        px, py = mount[0] + away * directions[k, 0], mount[1] + away * directions[k, 1]
         if (px - x0) ** 2 + (py - y0) ** 2 >= (radius + swept + margin) ** 2:
             continue
         now = _away(poses[0], px, py, corners, radius)
