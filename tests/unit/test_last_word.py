@@ -171,6 +171,27 @@ def test_what_lies_deep_in_the_body_is_its_own() -> None:
         assert word.allows(command)
 
 
+def refused_share(walls: list[list[float]], command: Twist, draws: int = 200) -> float:
+    """How often a laser whose ranges are 3 cm off makes it refuse a command."""
+    vague = ALL_ROUND.model_copy(update={"range_var_m2": 9e-4})
+    rng, clean = np.random.default_rng(5), scan_of(vague, *walls).ranges_m
+    refused = 0
+    for _ in range(draws):
+        word = word_of({"lidar": vague})
+        for k in range(3):
+            hears(word, 0.1 * (k + 1), lidar=LidarScan(clean + 0.03 * rng.standard_normal(len(clean))))
+        refused += not word.allows(command)
+    return refused / draws
+
+
+def test_a_vague_laser_neither_stops_it_in_a_corridor_nor_lets_it_into_a_wall() -> None:
+    """Two deviations of 3 cm were taken off what counts as touched: a wall was in it before that was."""
+    slowly = Twist(0.1, 0.0)
+    assert refused_share([[0.31, -3.0, 0.31, 3.0]], slowly) > 0.95
+    assert refused_share([[0.31, -0.006, 0.31, 0.006]], slowly) > 0.75
+    assert refused_share([[-3.0, 0.42, 3.0, 0.42], [-3.0, -0.42, 3.0, -0.42]], AHEAD_M_S) == 0.0
+
+
 def test_the_reach_of_a_short_sighted_laser_is_no_wall() -> None:
     short = LidarConfig(max_range_m=0.35)
     word = hears(word_of({"lidar": short}), 0.1, lidar=LidarScan(np.full(539, 0.35)))

@@ -15,7 +15,7 @@ NEARER_M = 1e-9
 """Turned about its axle a disc is where it was but for rounding."""
 
 NEIGHBOURS, BESIDE = 2, 0.5
-"""Beams to either side that confirm an end, if they look in about its direction: the cosine of 60 degrees."""
+"""Beams to either side confirm an end if they look in about its direction: the cosine of 60 degrees."""
 SAME_M, SAME_BEAMS = 0.1, 3.0
 """Ends so near to each other, or of so many times the distance between their beams, are of one thing."""
 
@@ -62,6 +62,17 @@ def _away(pose: FloatArray, px: float, py: float, corners: FloatArray, radius: f
 
 
 @kernel
+def _range_of(ranges: FloatArray, k: int, same: float) -> float:
+    """A beam's range, averaged over those beside it that end at the same surface: each has its own noise."""
+    total, count = 0.0, 0
+    for i in range(max(k - NEIGHBOURS, 0), min(k + NEIGHBOURS + 1, ranges.shape[0])):
+        if abs(ranges[i] - ranges[k]) <= same:
+            total += ranges[i]
+            count += 1
+    return total / count
+
+
+@kernel
 def touches_an_end(
     ranges: FloatArray,
     directions: FloatArray,
@@ -74,6 +85,7 @@ def touches_an_end(
     radius: float,
     margin: float,
     own: float,
+    same: float,
 ) -> bool:
     """Whether a confirmed end of a beam comes nearer than ``margin``, and nearer than it is, on a move.
 
@@ -96,6 +108,8 @@ def touches_an_end(
         (K, 2) of a polygon, none of a disc; of the disc around the axle that holds it.
     own
         Deeper in the outline than this is deep.
+    same
+        Ranges of neighbours that differ by no more are of one surface.
     """
     x0, y0, theta0 = start
     ahead, lateral, angle = move
@@ -109,7 +123,8 @@ def touches_an_end(
     for k in range(ranges.shape[0]):
         if not ranges[k] < reach:
             continue
-        px, py = mount[0] + ranges[k] * directions[k, 0], mount[1] + ranges[k] * directions[k, 1]
+        away = _range_of(ranges, k, same)
+        px, py = mount[0] + away * directions[k, 0], mount[1] + away * directions[k, 1]
         if (px - x0) ** 2 + (py - y0) ** 2 >= (radius + swept + margin) ** 2:
             continue
         now = _away(poses[0], px, py, corners, radius)

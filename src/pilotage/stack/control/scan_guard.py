@@ -23,6 +23,8 @@ MOST_PIECES = 100
 """A metre, within which a robot that is guarded stops."""
 OWN_M = 0.05
 """An end so much deeper in the outline than a range may be off is the robot's own."""
+SAME_STDS = 4.0
+"""By so many deviations of a range neighbouring ones of one surface differ at most."""
 PERIODS = 3.0
 """A scan counts for so many of its laser's periods, where no other comes."""
 EPSILON_S = 1e-9
@@ -47,9 +49,10 @@ class LaserView:
         self.directions = read_only(np.column_stack([np.cos(angles_rad), np.sin(angles_rad)]))
         self.mount = sheet.mount.x_m, sheet.mount.y_m
         self._arm_m, self._sure_m = math.hypot(*self.mount), sheet.sure_range_m
-        # The nearest of some returns of a wall is told too near by about two deviations.
+        # The nearest of some returns is told too near by about two deviations; a vague laser's are averaged.
         std_m = math.sqrt(sheet.range_var_m2)
-        self.margin_m, self.own_m = TOUCH_M - 2.0 * std_m, OWN_M + 3.0 * std_m
+        self.margin_m, self.own_m = max(TOUCH_M - 2.0 * std_m, 0.0), OWN_M + 3.0 * std_m
+        self.same_m = SAME_STDS * std_m
         self._scans: list[Scan] = []
 
     def take_in(self, readings: Readings, here: tuple[float, float, float]) -> None:
@@ -150,6 +153,7 @@ class ScanGuard:
                 self._radius_m,
                 laser.margin_m,
                 laser.own_m,
+                laser.same_m,
             ):
                 break
         else:
