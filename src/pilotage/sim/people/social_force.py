@@ -104,12 +104,14 @@ class SocialForcePeople:
         others = [np.delete(around.people_m, own, axis=0)]
         if self._heeds:
             others.append(around.robots_m[:, [0, 1, 3]])
+        # In one order of its numbers, whoever is there: kernels are compiled apart for the other.
+        solid = np.ascontiguousarray(np.concatenate(others))
         steps = math.ceil(span / SUBSTEP_S - 1e-9)
         for _ in range(steps):
             kernels.walk(
                 self._walkers,
                 self._goals,
-                np.concatenate(others),
+                solid,
                 self._ground,
                 self._forces,
                 span / steps,

@@ -200,7 +200,8 @@ class _Levelling:
     """Moves vertices between shares, and swaps them, while that lowers the cost."""
 
     def __init__(self, graph: PatrolGraph, sizes: tuple[int, ...]) -> None:
-        self._costs_m, self._sizes = graph.shortest_m, np.array(sizes)
+        # A copy: the graph's may not be written to, and kernels of tours are compiled apart for such.
+        self._costs_m, self._sizes = np.array(graph.shortest_m), np.array(sizes)
         self._near = _near(graph)
 
     def run(self, shares: list[set[int]]) -> float:
