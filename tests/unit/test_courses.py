@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from pilotage.core.errors import InputError
+from pilotage.kernels.arrays import read_only
 from pilotage.kernels.control.pose_search import CLOSED, FOUND, passage
 from pilotage.maps.courses import Course, make_course
 
@@ -20,7 +21,7 @@ def status(course: Course) -> int:
         x,
         y,
         0.5,
-        JACKAL,
+        read_only(JACKAL),
         course.circles_m,
         np.array([-2.5, -1.2]),
         np.array([2.5, y + 0.6]),

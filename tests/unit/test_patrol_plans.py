@@ -47,8 +47,8 @@ def test_walks_are_judged_as_robots_that_go_round_visit(size: int, seed: int, tu
     order = rng.permutation(len(graph))[: rng.integers(2, 12)].astype(np.int64)
     walk = Round.through(graph, order)
     worst, mean = np.empty(len(graph)), np.empty(len(graph))
-    places = graph.vertices_xy_m.copy()
-    judge_walk(order, size, (graph.next_hop.copy(), graph.edges_m.copy(), places, turn_m), worst, mean)
+    places = graph.vertices_xy_m
+    judge_walk(order, size, (graph.next_hop.copy(), graph.edges_m, places, turn_m), worst, mean)
     to_last = places[np.roll(walk.stops, 1)] - places[walk.stops]
     to_next = places[np.roll(walk.stops, -1)] - places[walk.stops]
     bearing = [np.arctan2(to[:, 1], to[:, 0]) for to in (to_last, to_next)]
@@ -78,7 +78,7 @@ def test_walks_turn_back_less_where_that_costs(seed: int, sizes: tuple[int, ...]
 
     def cost(plan: Plan) -> float:
         gaps = np.empty((2, len(sizes), len(graph)))
-        ground = graph.next_hop.copy(), graph.edges_m.copy(), graph.vertices_xy_m.copy(), turn_m
+        ground = graph.next_hop.copy(), graph.edges_m, graph.vertices_xy_m, turn_m
         for group, walk in enumerate(plan.rounds):
             judge_walk(walk.stops, sizes[group], ground, gaps[0, group], gaps[1, group])
         return float(plan_cost(gaps[0], gaps[1], np.array(sizes), 2.0, 0.0))

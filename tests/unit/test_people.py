@@ -98,7 +98,7 @@ def test_who_overtakes_a_robot_through_it_is_not_hit_by_it() -> None:
 def test_who_leaves_a_robot_is_not_in_its_way() -> None:
     """Also in the step that takes a runner out of it: he is just ahead then, and would stop it."""
     state = np.zeros((1, STATE_SIZE))
-    corners, first = np.asarray(CAR.points_m), np.array([0, len(CAR.points_m)])
+    corners, first = np.array(CAR.points_m), np.array([0, len(CAR.points_m)])
     ahead = np.array([[float(corners[:, 0].max()) + 0.3, 0.0]])
     for between, passes in ((WALKED_INTO, True), (APART, False)):
         radii, radius = np.array([CAR.radius_m]), np.array([0.25])

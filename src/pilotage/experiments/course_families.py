@@ -210,7 +210,7 @@ def _bottleneck(
     low, high = np.array([-2.5, -1.2]), np.array([2.5, y + 0.6])
     if not _drives_straight(made, driver):
         status, _ = passage(
-            np.array(made.start), x, y, TOLERANCE_M, np.ascontiguousarray(driver.outline),
+            np.array(made.start), x, y, TOLERANCE_M, read_only(driver.outline),
             made.circles_m, low, high, CELL_M, 0.0,
         )  # fmt: skip
         if status == CLOSED:
@@ -315,7 +315,7 @@ def _has_passage(
     discs = np.column_stack([near, np.full(len(near), spacing_m / math.sqrt(2.0))])
     heading = math.atan2(goal[1] - start[1], goal[0] - start[0])
     status, _ = passage(
-        np.array([*start, heading]), goal[0], goal[1], TOLERANCE_M, np.ascontiguousarray(driver.outline),
+        np.array([*start, heading]), goal[0], goal[1], TOLERANCE_M, read_only(driver.outline),
         discs, low, high, max(CELL_M, math.sqrt(float(np.prod(high - low)) / MOST_CELLS)), 0.0,
     )  # fmt: skip
     return bool(status == FOUND)

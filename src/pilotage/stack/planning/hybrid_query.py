@@ -9,6 +9,7 @@ import numpy as np
 
 from pilotage.core.angles import wrap_array_to_pi
 from pilotage.core.types import FloatArray
+from pilotage.kernels.arrays import read_only
 from pilotage.kernels.rrt import hybrid, reeds_shepp
 from pilotage.kernels.rrt.clearance import Space
 from pilotage.kernels.rrt.samples import Bound
@@ -89,7 +90,7 @@ class HybridQuery:
         a turn on its axle, and so are both poses.
         """
         half_turn = np.array([0.0, 0.0, math.pi])
-        car = self.car._replace(corners=-self.car.corners)
+        car = self.car._replace(corners=read_only(-self.car.corners))
         start, goal = self.goal + half_turn, self.start + half_turn
         return replace(self, start=start, goal=goal, car=car, bound=bound, reversed_time=True)
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.types import FloatArray
+from pilotage.kernels.arrays import read_only
 from pilotage.kernels.rrt import hybrid, reeds_shepp
 from pilotage.kernels.rrt.clearance import Space
 from pilotage.maps.distance_field import DistanceField
@@ -28,7 +29,8 @@ HEADINGS = 72
 def car_of(footprint: Footprint | None, clearance_m: float, turning_m: float) -> hybrid.Car:
     """An outline as the kernels take it; without one the robot is a point."""
     outline = footprint or Footprint.disc(0.0)
-    points_m = np.ascontiguousarray(outline.points_m)
+    # A polygon's are read only anyway, and kernels are compiled apart for others.
+    points_m = read_only(outline.points_m)
     return hybrid.Car(points_m, outline.radius_m, outline.inner_radius_m, clearance_m, turning_m)
 
 
