@@ -327,6 +327,7 @@ def test_who_has_corners_waits_without_turning_them_into_a_wall(y_m: float, turn
         turn_rate_rad_s=0.8,
         may_turn=lambda pose: makes_room.may_turn(pose, NOTHING),
         waits=lambda *_: False,
+        meets_walls=lambda *_: False,
     )
     belief = Belief(place, np.eye(3))
     move = Waiting(context, context, 1.0).step(Readings(0.0), belief)

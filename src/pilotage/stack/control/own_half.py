@@ -64,7 +64,8 @@ class OwnHalf:
         self._car, self._ground = walls
         self.seen_m: FloatArray = np.zeros((0, 2))
         """(P, 2) what it heeds, in the map."""
-        self._unexplained: UnexplainedReturns | None = None
+        self.unexplained: UnexplainedReturns | None = None
+        """What makes out of a scan what it heeds; of who asks for the same it is worked out once."""
         self._lidar, self.reacts_s = "", robot.dt_s + motion.delay_s
         if len(lidars) != 1:
             return
@@ -74,15 +75,15 @@ class OwnHalf:
         same = unexplained is not None and (unexplained.tolerance_m, unexplained.sigmas)
         if unexplained is None or same != (config.tolerance_m, config.sigmas):
             unexplained = UnexplainedReturns(lidar, chart, config.tolerance_m, config.sigmas)
-        self._unexplained = unexplained
+        self.unexplained = unexplained
         unexplained.look_to(config.reach_m)
 
     def look(self, readings: Readings, belief: Belief, mapped_m: FloatArray) -> None:
         """Take in a step's scan, if there is one, and what was mapped (M, 3) and may be out of sight."""
         scan = readings.by_sensor.get(self._lidar)
-        if self._unexplained is None or not isinstance(scan, LidarScan):
+        if self.unexplained is None or not isinstance(scan, LidarScan):
             return
-        seen = self._unexplained.of(scan, belief)
+        seen = self.unexplained.of(scan, belief)
         reach_m = self._config.reach_m
         away_m = np.hypot(mapped_m[:, 0] - seen.x_m, mapped_m[:, 1] - seen.y_m)
         self.seen_m = np.concatenate(

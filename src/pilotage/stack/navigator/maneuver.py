@@ -126,7 +126,7 @@ class ManeuverNavigator(LocalizingNavigator):
         walls = car, ground_of(chart.field, car)
         self._own_half = OwnHalf(config.own_half, robot, chart, unexplained_of(parts), walls)
         self._bodies = MovingBodies(
-            config.moving_bodies, robot, chart, minds=not task.mates, unexplained=unexplained_of(parts)
+            config.moving_bodies, robot, chart, minds=not task.mates, unexplained=self._own_half.unexplained
         )
         self._gives_way = GiveWay(config.give_way, robot, self._bodies)
         self._yielding = Yielding(config.yielding, robot.dt_s, robot.streams.stream("yielding"))
