@@ -16,6 +16,7 @@ from pilotage.experiments.mission import mission_of
 from pilotage.experiments.run import run_mission
 from pilotage.kernels.scans.rays import fan_ranges
 from pilotage.models.footprint import Footprint
+from pilotage.models.motion.differential_drive import DifferentialDriveConfig
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, OdometryIncrement, Reading, Readings
 from pilotage.sensors.sensor import Mount, SensorConfig
@@ -31,6 +32,7 @@ NO_DISCS = np.zeros((0, 3))
 AHEAD = [0.37, -3.0, 0.37, 3.0]
 BESIDE, POST = [-3.0, 0.306, 3.0, 0.306], [-0.002, 0.3, 0.002, 0.3]
 AHEAD_M_S, BACK_M_S = Twist(0.5, 0.0), Twist(-0.5, 0.0)
+TOLD: dict[str, SensorConfig] = {"odometry": WheelOdometryConfig(rate_hz=10.0)}
 ALL_ROUND = LidarConfig(beams=2880, field_of_view_rad=2.0 * math.pi)
 
 
@@ -71,35 +73,50 @@ def hears(word: LastWord, t_s: float, **readings: Reading) -> LastWord:
     return word
 
 
+def rolls(word: LastWord, **readings: Reading) -> LastWord:
+    """It is as fast already as it is told to be: from rest no step gets it there."""
+    return hears(word, 0.1, odometry=OdometryIncrement(0.05, 0.15), **readings)
+
+
 def test_a_command_is_looked_at_by_what_the_laser_shows_as_far_as_it_takes_to_stop() -> None:
-    sheets = {"lidar": LidarConfig()}
+    sheets = {"lidar": LidarConfig()} | TOLD
     seen = scan_of(LidarConfig(), AHEAD)
-    word = hears(word_of(sheets), 0.1, lidar=seen)
+    word = rolls(word_of(sheets), lidar=seen)
     assert not word.allows(AHEAD_M_S)
     assert word.shown_m[:, 0].min() == pytest.approx(0.37)
     # Slowly there is room to stop; away, along, on the spot and without a scan as well.
     for command in (Twist(0.1, 0.0), BACK_M_S, Twist(0.0, 1.0), Twist(0.0, 0.0, 0.5), STOP):
         assert word.allows(command)
     assert hears(word_of(sheets), 0.1).allows(AHEAD_M_S)
-    assert hears(word_of({}), 0.1, lidar=seen).allows(AHEAD_M_S)
+    assert rolls(word_of(dict(TOLD)), lidar=seen).allows(AHEAD_M_S)
     # Corners swing where a disc does not.
     corners_m = np.array([[0.35, 0.2], [-0.1, 0.2], [-0.1, -0.2], [0.35, -0.2]])
-    angular = hears(word_of(sheets, Footprint.polygon(corners_m)), 0.1, lidar=seen)
+    angular = rolls(word_of(sheets, Footprint.polygon(corners_m)), lidar=seen)
     assert not angular.allows(Twist(0.0, -1.5))
     assert angular.allows(Twist(-0.3, 0.0))
 
 
 def test_what_is_touched_already_says_nothing_of_what_is_ahead() -> None:
     """Of all together the nearest got no nearer: beside a wall that it touched it drove into the next."""
-    word = hears(word_of({"lidar": ALL_ROUND}), 0.1, lidar=scan_of(ALL_ROUND, POST, AHEAD))
+    word = rolls(word_of({"lidar": ALL_ROUND} | TOLD), lidar=scan_of(ALL_ROUND, POST, AHEAD))
     assert word.allows(BACK_M_S)
     assert not word.allows(AHEAD_M_S)
     assert not word.allows(Twist(0.0, 0.0, 0.3))
-    along = hears(word_of({"lidar": ALL_ROUND}), 0.1, lidar=scan_of(ALL_ROUND, BESIDE))
+    along = rolls(word_of({"lidar": ALL_ROUND} | TOLD), lidar=scan_of(ALL_ROUND, BESIDE))
     assert along.allows(AHEAD_M_S)
     assert along.allows(Twist(0.3, -1.5))
     assert not along.allows(Twist(0.3, 1.5))
     assert not along.allows(Twist(0.0, 0.0, 0.3))
+
+
+def test_from_rest_it_gets_no_faster_than_it_can_in_a_step() -> None:
+    """With weak brakes it stood before every wall that it could have crept up to, for good."""
+    weak = replace(told_of().robot, sensors={"lidar": ALL_ROUND, **TOLD})
+    weak = replace(weak, motion=DifferentialDriveConfig(max_speed_m_s=1.5, max_acceleration_m_s2=0.3))
+    near, fast = scan_of(ALL_ROUND, [0.34, -3.0, 0.34, 3.0]), Twist(1.0, 0.0)
+    stands = hears(LastWord(weak), 0.1, lidar=near, odometry=OdometryIncrement(0.0, 0.0))
+    assert stands.allows(fast)
+    assert not hears(LastWord(weak), 0.1, lidar=near, odometry=OdometryIncrement(0.015, 0.0)).allows(fast)
 
 
 @pytest.mark.parametrize(("beams", "field_rad"), [(720, 2.0 * math.pi), (90, 2.0 * math.pi), (181, math.pi)])
@@ -111,7 +128,7 @@ def test_what_one_beam_alone_sees_is_dust(beams: int, field_rad: float) -> None:
     def allows(near: list[int]) -> bool:
         ranges_m = np.full(beams, 3.0)
         ranges_m[near] = 0.35
-        return hears(word_of({"lidar": sheet}), 0.1, lidar=LidarScan(ranges_m)).allows(AHEAD_M_S)
+        return rolls(word_of({"lidar": sheet} | TOLD), lidar=LidarScan(ranges_m)).allows(AHEAD_M_S)
 
     assert allows([ahead])
     assert allows([ahead - 5, ahead, ahead + 5])
@@ -121,7 +138,7 @@ def test_what_one_beam_alone_sees_is_dust(beams: int, field_rad: float) -> None:
 
 def test_of_a_laser_without_beams_beside_each_other_each_is_believed() -> None:
     sheet = LidarConfig(beams=3, field_of_view_rad=math.pi)
-    word = hears(word_of({"lidar": sheet}), 0.1, lidar=LidarScan(np.array([3.0, 0.35, 3.0])))
+    word = rolls(word_of({"lidar": sheet} | TOLD), lidar=LidarScan(np.array([3.0, 0.35, 3.0])))
     assert not word.allows(AHEAD_M_S)
 
 
@@ -133,7 +150,9 @@ def test_each_laser_is_heeded_where_it_sits() -> None:
         "back": half.model_copy(update={"mount": Mount(x_m=-0.2, theta_rad=math.pi)}),
     }
     behind = [-0.37, -3.0, -0.37, 3.0]
-    word = hears(word_of(sheets), 0.1, **{name: scan_of(sheet, behind) for name, sheet in sheets.items()})
+    word = rolls(
+        word_of({**sheets, **TOLD}), **{name: scan_of(sheet, behind) for name, sheet in sheets.items()}
+    )
     assert not word.allows(BACK_M_S)
     assert word.allows(AHEAD_M_S)
 
@@ -156,7 +175,7 @@ def test_a_scan_counts_for_three_periods_from_where_the_robot_has_come_since(tol
         hears(word, 0.1 * k, **odometry)
     # It stands where the disc of 0.3 m nearly touches, by the scan of long ago.
     assert 0.9 - 0.3 - 0.08 < at_m < 0.9 - 0.3
-    assert not word.allows(AHEAD_M_S)
+    assert not word.allows(step)
     assert word.held_s == pytest.approx(0.1 * (27 - 1 - round(at_m / 0.03)), abs=0.11)
     assert hears(word, 3.05).allows(AHEAD_M_S)
 

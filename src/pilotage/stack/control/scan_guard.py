@@ -103,15 +103,19 @@ class ScanGuard:
             for name, sheet in robot.sensors.items()
             if isinstance(sheet, LidarConfig) and not isinstance(sheet, JointLidarConfig)
         ]
-        self._motion = OwnMotion(robot)
+        self._motion, self._dt_s = OwnMotion(robot), robot.dt_s
         self._t_s, self._here = 0.0, (0.0, 0.0, 0.0)
+        # So fast it is by the time that it reacts, at most.
+        self._most_m_s, self._most_rad_s = self._faster_than(0.0, 0.0)
 
     def take_in(self, readings: Readings) -> None:
         """Take in what came in a step; to be called at every one, before commands are asked about."""
         if not self._lasers:
             return
         self._t_s = readings.t_s
-        self._here = turned_part(*self._here, *self._motion.step(readings), 1.0)
+        moved = ahead_m, lateral_m, angle_rad = self._motion.step(readings)
+        self._here = turned_part(*self._here, *moved, 1.0)
+        self._most_m_s, self._most_rad_s = self._faster_than(math.hypot(ahead_m, lateral_m), angle_rad)
         for laser in self._lasers:
             laser.take_in(readings, self._here)
 
@@ -125,7 +129,9 @@ class ScanGuard:
 
         Of none where it would not.
         """
-        speed_m_s, w_rad_s = math.hypot(command.v_m_s, command.lateral_m_s), self._can_turn(command)
+        told_m_s = math.hypot(command.v_m_s, command.lateral_m_s)
+        speed_m_s = min(told_m_s, self._most_m_s)
+        w_rad_s = self._can_turn(command.w_rad_s, speed_m_s)
         turn_rate = abs(w_rad_s)
         if speed_m_s == 0.0 and turn_rate == 0.0:
             return NOTHING
@@ -139,7 +145,8 @@ class ScanGuard:
         # So finely that no corner skips over what is touched.
         swept_m = (speed_m_s + turn_rate * self._radius_m) * until_s + TOUCH_M
         pieces = min(math.ceil(swept_m / TOUCH_M), MOST_PIECES)
-        move = command.v_m_s * until_s, command.lateral_m_s * until_s, w_rad_s * until_s
+        each_s = until_s * speed_m_s / told_m_s if told_m_s > 0.0 else 0.0
+        move = command.v_m_s * each_s, command.lateral_m_s * each_s, w_rad_s * until_s
         for laser, scan, reach_m in near:
             if touches_an_end(
                 scan.ranges_m,
@@ -163,12 +170,20 @@ class ScanGuard:
             [pose.seen(Pose2(*scan.at).placed(laser.ends_m(scan, reach_m))) for laser, scan, reach_m in near]
         )
 
-    def _can_turn(self, command: Twist) -> float:
+    def _faster_than(self, moved_m: float, turned_rad: float) -> tuple[float, float]:
+        """The most speed and turn rate that it comes to from what it moved in a step, before it reacts."""
+        gains_m_s, gains_rad_s = self._braking_m_s2 * self._reacts_s, self._slowing_rad_s2 * self._reacts_s
+        return moved_m / self._dt_s + gains_m_s, abs(turned_rad) / self._dt_s + gains_rad_s
+
+    def _can_turn(self, w_rad_s: float, speed_m_s: float) -> float:
         """The turn rate that it makes of a command: wheels do not turn so sharply, nor so fast."""
-        most, least_m = self._limits.top_turn_rate_rad_s, self._limits.least_turning_radius_m
+        most, least_m = (
+            min(self._limits.top_turn_rate_rad_s, self._most_rad_s),
+            self._limits.least_turning_radius_m,
+        )
         if least_m > 0.0:
-            most = min(most, abs(command.v_m_s) / least_m)
-        return min(max(command.w_rad_s, -most), most)
+            most = min(most, speed_m_s / least_m)
+        return min(max(w_rad_s, -most), most)
 
 
 def _since(at: tuple[float, float, float], here: tuple[float, float, float]) -> tuple[float, float, float]:
