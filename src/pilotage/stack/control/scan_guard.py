@@ -105,7 +105,7 @@ class ScanGuard:
         ]
         self._motion, self._dt_s = OwnMotion(robot), robot.dt_s
         self._t_s, self._here = 0.0, (0.0, 0.0, 0.0)
-        # So fast it is by the time that it reacts, at most.
+        # So fast it is by the time that it reacts to what comes in the next step, at most.
         self._most_m_s, self._most_rad_s = self._faster_than(0.0, 0.0)
 
     def take_in(self, readings: Readings) -> None:
@@ -171,8 +171,9 @@ class ScanGuard:
         )
 
     def _faster_than(self, moved_m: float, turned_rad: float) -> tuple[float, float]:
-        """The most speed and turn rate that it comes to from what it moved in a step, before it reacts."""
-        gains_m_s, gains_rad_s = self._braking_m_s2 * self._reacts_s, self._slowing_rad_s2 * self._reacts_s
+        """The most speed and turn rate that comes of what it moved in a step, until it reacts anew."""
+        for_s = self._reacts_s + self._dt_s
+        gains_m_s, gains_rad_s = self._braking_m_s2 * for_s, self._slowing_rad_s2 * for_s
         return moved_m / self._dt_s + gains_m_s, abs(turned_rad) / self._dt_s + gains_rad_s
 
     def _can_turn(self, w_rad_s: float, speed_m_s: float) -> float:
