@@ -58,7 +58,7 @@ class LaserView:
     def take_in(self, readings: Readings, here: tuple[float, float, float]) -> None:
         """A step's scan, and where the robot is now."""
         t_s, scan = readings.t_s, readings.by_sensor.get(self._name)
-        if self._scans and t_s > self._scans[0].until_s:
+        while self._scans and t_s > self._scans[0].until_s:
             del self._scans[0]
         if isinstance(scan, LidarScan):
             nearest_m = float(np.fmin.reduce(scan.ranges_m)) if len(scan.ranges_m) else math.inf
