@@ -13,7 +13,6 @@ from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.maps.world_map import WorldMap
 from pilotage.models.odometry import OdometryModel
-from pilotage.sensors.joint_lidar import JointLidarConfig
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, OdometryIncrement, Readings
 from pilotage.sensors.sensor import Positive
@@ -49,8 +48,7 @@ MOST_REFUSED = 0.25
 LEAST_BY_NOISE = 0.5
 """Of the lines that its noise lets through: all of a scan are refused that do not agree."""
 MOST_ALIKE = 5
-"""So many joint scans of several lasers count where the robot stands: beams between the lasers are off by the
-same in each."""
+"""So many scans count where the robot stands: what walls and lines are wrong by is the same in all."""
 
 
 class EkfWallsConfig(Config):
@@ -83,7 +81,8 @@ class EkfWallsLocalizer:
     nothing, until the search through the map has one pose left. So it starts without a pose, too.
 
     Fails where walls run in one direction only (the pose along them is dead reckoning then), and in a map
-    that repeats itself farther than the robot sees.
+    that repeats itself farther than the robot sees. Where the robot stands it takes in a few scans and only
+    judges itself by the others.
     """
 
     BY_COMMANDS: ClassVar[bool] = True
@@ -112,7 +111,7 @@ class EkfWallsLocalizer:
         self._extractor = LineExtractor(config.lines, lidar, range_var, robot.streams.stream("ekf-walls"))
         # Only the covariances are scaled: which points make a line is no matter of belief.
         self._var_scale = config.measurement_var_scale
-        self._joint, self._moved_m, self._alike = isinstance(lidar, JointLidarConfig), 0.0, 0
+        self._moved_m, self._alike, self._most_matched = 0.0, 0, 0
         self._mount = lidar.mount.as_array()
         self._matcher = WallMatcher(config.matching, config.gate, chart.reflectors, self._mount)
         if config.recovery is None:
@@ -150,7 +149,8 @@ class EkfWallsLocalizer:
         odometry = self._motion.increment(readings, self.belief)
         if odometry is not None:
             self._move(odometry)
-        self._watch.widen(self._cov, readings.t_s, odometry)
+        if self._watch.widen(self._cov, readings.t_s, odometry):
+            self._alike = 0
         seen, used, nis = 0, 0, 0.0
         scan = readings.by_sensor.get(self._lidar)
         if isinstance(scan, LidarScan):
@@ -204,16 +204,21 @@ class EkfWallsLocalizer:
         return count, total
 
     def _tells_nothing_new(self, matched: int) -> bool:
-        """Whether a scan is one too many of several lasers from where the robot stands."""
+        """Whether a scan is one too many from where the robot stands (0286)."""
         stands, self._moved_m = self._moved_m < STANDS_M, 0.0
-        self._alike = self._alike + (matched > 0) if stands else 0
-        return self._joint and self._alike > MOST_ALIKE
+        if not stands or self._alike == 0:
+            self._alike, self._most_matched = 0, 0
+        # Walls that others hid until now are new also to whom that stands.
+        if matched > self._most_matched:
+            self._alike, self._most_matched = 0, matched
+        self._alike += matched > 0
+        return self._alike > MOST_ALIKE
 
     def _find(self, lines: DetectedLines, ranges_m: FloatArray) -> None:
         assert self._recovery is not None, "never lost without it"
         found = self._recovery.find(lines, ranges_m)
         if found is not None:
-            self._pose, self._cov, self._lost = found.pose, found.cov, False
+            self._pose, self._cov, self._lost, self._alike = found.pose, found.cov, False, 0
 
     def tell_mates(self, mates: FloatArray) -> None:
         """Where mates (K, 4) say that they are, as of ``ScanFit.mates_in_sight``."""
