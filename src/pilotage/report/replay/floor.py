@@ -237,6 +237,7 @@ def _states(column: Column) -> States | None:
 
 
 def _series(column: Column) -> tuple[Series, ...]:
+    command = column("v_cmd_m_s")
     series = [
         position_error(column),
         Series(
@@ -244,7 +245,7 @@ def _series(column: Column) -> tuple[Series, ...]:
             "m/s",
             column("v_true_m_s"),
             BLUE,
-            other=column("v_cmd_m_s"),
+            other=command if bool(np.isfinite(command).any()) else None,
             other_name="command",
         ),
         Series("clearance", "m", column("clearance_m"), GREEN),
