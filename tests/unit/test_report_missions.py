@@ -46,6 +46,8 @@ def checked_page(run_dir: Path, *figures: str) -> str:
     empty = re.findall(r'<section id="([^"]+)"><h2>.{0,200}?</h2><p class="absent">', page)
     assert set(empty) <= {"events"}
     assert not re.search(r">nan<|\bNaN\b.*</svg>", page)
+    for caption in re.findall(r"<figcaption>(.*?)</figcaption>", page, re.DOTALL):
+        assert not re.search(r"\. +[a-z]+ ", re.sub("<[^>]*>", "", caption)), "a sentence begins small"
     return page
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis, YAxis
+from matplotlib.figure import Figure
 from rich.console import Console
 from scipy.stats import chi2
 
@@ -23,11 +25,13 @@ from pilotage.records.run_data import read_run
 from pilotage.report import quantities, style, summary_table
 from pilotage.report.calibration.plots import MOST_BINS, histogram, panels_in_a_row
 from pilotage.report.event_kinds import event_kind
-from pilotage.report.figures.consistency import chi_square_band
+from pilotage.report.figures.close_ups import close_ups_figure
+from pilotage.report.figures.consistency import _statistic, chi_square_band
 from pilotage.report.figures.layers import ellipse_outlines
 from pilotage.report.figures.map_view import view_limits
 from pilotage.report.figures.placing import LabelPlacer, along
 from pilotage.report.headline import headline
+from pilotage.report.light_axes import LightAxes
 from pilotage.report.markup import Html, escape, table
 from pilotage.report.series import band, decimate, merge_spans, running_mean, spans
 from pilotage.report.team import colour_of
@@ -271,3 +275,23 @@ def test_ticks_that_nobody_styled_one_by_one_are_as_matplotlib_copies_them(
     monkeypatch.setattr(style, "LightAxes", Axes)
     assert drawn() == now
     assert len(copied) > 2 * before + 10
+
+
+def test_a_filter_that_is_far_too_modest_is_on_its_axis() -> None:
+    figure = Figure()
+    axes = figure.add_subplot(axes_class=LightAxes)
+    t_s, modest = np.arange(0.0, 50.0, 0.1), np.full(500, 0.004)
+    _statistic(axes, t_s, modest, np.full(500, 0.2), np.full(500, 9.3), 3.0, 100)
+    assert axes.get_ylim()[0] < 0.004
+    _statistic(axes, t_s, np.full(500, 2.9), np.full(500, 0.2), np.full(500, 9.3), 3.0, 100)
+    assert axes.get_ylim()[0] > 0.04
+
+
+def test_close_ups_are_as_large_as_the_body_asks_for(tmp_path: Path) -> None:
+    run = read_run(fabricate_run(tmp_path / "run"))
+    corners = np.array([[0.75, 0.3], [-0.25, 0.3], [-0.25, -0.3], [0.75, -0.3]])
+    car = replace(run.world.robots[0], polygon_m=corners, radius_m=0.85)
+    figure = close_ups_figure(replace(run, world=replace(run.world, robots=(car,))))
+    # Of the car's length, not of the circle about its rear axle that holds it.
+    assert "Windows of 6.00\u00a0m" in figure.caption
+    assert "Windows of 3.60\u00a0m" in close_ups_figure(run).caption
