@@ -27,7 +27,9 @@ from pilotage.report.calibration.plots import MOST_BINS, histogram, panels_in_a_
 from pilotage.report.event_kinds import event_kind
 from pilotage.report.figures.close_ups import close_ups_figure
 from pilotage.report.figures.consistency import _statistic, chi_square_band
+from pilotage.report.figures.covariance import covariance_figure
 from pilotage.report.figures.layers import ellipse_outlines
+from pilotage.report.figures.map import map_figure
 from pilotage.report.figures.map_view import view_limits
 from pilotage.report.figures.placing import LabelPlacer, along
 from pilotage.report.headline import headline
@@ -295,3 +297,17 @@ def test_close_ups_are_as_large_as_the_body_asks_for(tmp_path: Path) -> None:
     # Of the car's length, not of the circle about its rear axle that holds it.
     assert "Windows of 6.00\u00a0m" in figure.caption
     assert "Windows of 3.60\u00a0m" in close_ups_figure(run).caption
+
+
+def test_a_pose_that_was_given_is_sure_and_not_unrecorded(tmp_path: Path) -> None:
+    nothing = np.zeros(60)
+    given = dict.fromkeys(("cov_xx_m2", "cov_yy_m2", "cov_tt_rad2"), nothing)
+    figure = covariance_figure(read_run(fabricate_run(tmp_path / "run", steps=60, columns=given)))
+    assert "zero throughout" in figure.svg
+    assert "not recorded" not in figure.svg
+
+
+def test_pillars_alone_are_walls_in_the_legend(tmp_path: Path) -> None:
+    run = read_run(fabricate_run(tmp_path / "run"))
+    pillars = replace(run.world, segments_m=np.zeros((0, 4)), circles_m=np.array([[1.0, 1.0, 0.2]]))
+    assert "walls" in {key.label for key in map_figure(replace(run, world=pillars)).keys}
