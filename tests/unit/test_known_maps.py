@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from pilotage.core.content import content_of
+from pilotage.core.errors import InputError
 from pilotage.core.types import Pose2
 from pilotage.experiments.build.charts import chart_of
 from pilotage.maps import known_maps
@@ -22,6 +23,7 @@ from pilotage.maps.occupancy_grid import OccupancyGrid
 from pilotage.maps.segment_map import SegmentMap, box_segments
 from pilotage.maps.world_map import WorldMap
 from pilotage.missions.world import WorldConfig
+from pilotage.stack.localization.landmark_filter import known_landmarks
 from pilotage.stack.patrol import roadmap
 from pilotage.stack.patrol.roadmap import roadmap_of
 
@@ -160,3 +162,11 @@ class TestThreads:
 
         with ThreadPoolExecutor(8) as pool:
             assert all(pool.map(ask, range(4000)))
+
+
+def test_a_filter_on_landmarks_without_any_is_told_what_else_there_is() -> None:
+    bare = WorldMap(
+        "bare", BOUNDS, geometry=SegmentMap(np.array([[0.0, 0.0, 4.0, 0.0]]), np.zeros((0, 3)), BOUNDS)
+    )
+    with pytest.raises(InputError, match=r"ekf-landmarks: .*world\.landmarks.*particle-filter"):
+        known_landmarks(bare, "ekf-landmarks")

@@ -21,7 +21,7 @@ from pilotage.records.trace import Trace
 from pilotage.report import write_report
 from pilotage.report.replay.floor import floor_scene
 from pilotage.report.replay.packing import pack
-from pilotage.report.replay.scene import PoseTrack, Raster, ReplayScene, ScanTrack
+from pilotage.report.replay.scene import Marks, PoseTrack, Raster, ReplayScene, ScanTrack, Series
 from pilotage.report.replay.section import replay_section
 from pilotage.sensors.beacon import BeaconConfig
 from pilotage.sensors.lidar import LidarConfig
@@ -286,3 +286,85 @@ def test_cells_fill_in_and_empty_again(browser: Browser, tmp_path: Path) -> None
     assert browser.js(f"{PLAYER}.seek(4.9) || {pixel}") == "255,255,255"
     assert browser.js(f"{PLAYER}.seek(5.1) || {pixel}") == "255,0,0"
     assert browser.js(f"{PLAYER}.seek(1.0) || {pixel}") == "255,255,255"
+
+
+def shown(browser: Browser, scene: ReplayScene, folder: Path) -> None:
+    """Open a page of nothing but this scene's replay."""
+    page = folder / "page.html"
+    page.write_text(f"<!DOCTYPE html><body>{replay_section(scene).html}", encoding="utf-8")
+    browser.size(1400, 1000)
+    browser.open(page, READY)
+
+
+def test_panels_tell_tiny_values_and_no_dust(browser: Browser, tmp_path: Path) -> None:
+    t_s = np.arange(4.0)
+    error = Series("position error", "m", np.array([0.0, 2.1e-5, 5e-4, 1e-4]), "ink")
+    speed = Series("speed", "m/s", np.array([0.0, 1e-9, 0.5, 0.25]), "ink")
+    shown(browser, ReplayScene(t_s, (0.0, 0.0, 1.0, 1.0), series=(error, speed)), tmp_path)
+    said = (
+        "((k, i) => { const s = " + PLAYER + ".series; const of = s.scene.series[k];"
+        " return s.number(of.values[i], s.digits(of)); })"
+    )
+    assert browser.js(f"{said}(0, 0)") == "0"
+    assert browser.js(f"{said}(0, 1)") == "0.000021"
+    assert browser.js(f"{said}(1, 1)") == "0.0000"
+    assert browser.js(f"{said}(1, 2)") == "0.50"
+
+
+def test_a_replay_without_ellipses_does_not_offer_to_enlarge_them(browser: Browser, tmp_path: Path) -> None:
+    t_s, still = np.arange(4.0), np.zeros(4)
+    robot = PoseTrack("robot", t_s, still, still, "ink")
+    scene = ReplayScene(t_s, (0.0, 0.0, 4.0, 1.0), poses=(robot,))
+    shown(browser, scene, tmp_path)
+    assert browser.js("document.querySelector('[data-replay-exaggerate]') === null")
+    unsure = replace(robot, cov_m2=np.full((4, 3), np.nan))
+    shown(browser, replace(scene, poses=(unsure,)), tmp_path)
+    assert browser.js("document.querySelector('[data-replay-exaggerate]') === null")
+    sure = replace(robot, cov_m2=np.tile([0.01, 0.0, 0.01], (4, 1)))
+    shown(browser, replace(scene, poses=(sure,)), tmp_path)
+    assert browser.js("document.querySelector('[data-replay-exaggerate]') !== null")
+
+
+def test_labels_are_neither_on_the_ruler_nor_cut(browser: Browser, tmp_path: Path) -> None:
+    t_s, still = np.arange(4.0), np.zeros(4)
+    robot = PoseTrack("robot", t_s, still, still, "ink")
+    places = np.array([[0.05, 0.1], [9.99, 5.0], [5.0, 9.99]])
+    marks = Marks("places", places, ("in the corner", "at the side", "at the top"), "ink")
+    shown(browser, ReplayScene(t_s, (0.0, 0.0, 10.0, 10.0), marks=(marks,), poses=(robot,)), tmp_path)
+    browser.js(f"{PLAYER}.zoom(1.06)")  # the map's rim is the view's
+    boxes = browser.js(
+        f"(() => {{ const m = {PLAYER}.map, pen = m.canvas.getContext('2d'), at = [];"
+        " const write = pen.fillText; pen.fillText = (text, x, y) => at.push([text, x, y, pen.textBaseline]);"
+        f" {PLAYER}.draw(); pen.fillText = write; return [at, m.width, m.height, m.ruler()[1]]; }})()"
+    )
+    words, width, height, ruler = boxes
+    said = {text: (x, y) for text, x, y, baseline in words if baseline == "middle"}
+    assert set(said) >= {"at the side", "at the top"}
+    for text, (x, y) in said.items():
+        assert 0.0 <= x <= width - 7.0 * len(text), text
+        assert 6.0 <= y <= height - 6.0, text
+        assert x > 12.0 + ruler or y < height - 34.0, text
+
+
+def test_a_view_that_was_moved_stays_where_the_page_gets_another_width(browser: Browser, page: Path) -> None:
+    browser.size(1400, 1000)
+    browser.open(page, READY)
+    x, y = centre(browser, "map")
+    browser.mouse("mousePressed", x, y)
+    browser.mouse("mouseMoved", x + 60, y)
+    browser.mouse("mouseReleased", x + 60, y)
+    where = browser.js(f"{PLAYER}.map.x")
+    browser.size(900, 1000)
+    browser.wait(f"{PLAYER}.map.width < 600")
+    assert browser.js(f"{PLAYER}.map.x") == where
+    browser.js(f"{PLAYER}.fit()")
+    assert browser.js(f"{PLAYER}.map.x") != where
+
+
+def test_a_command_that_was_never_recorded_is_not_told(tmp_path: Path) -> None:
+    nothing = np.full(40, np.nan)
+    run = read_run(fabricate_run(tmp_path / "run", steps=40, columns={"v_cmd_m_s": nothing}))
+    scene = floor_scene(run)
+    assert scene is not None
+    (speed,) = (series for series in scene.series if series.title == "speed")
+    assert speed.other is None

@@ -46,6 +46,8 @@ def checked_page(run_dir: Path, *figures: str) -> str:
     empty = re.findall(r'<section id="([^"]+)"><h2>.{0,200}?</h2><p class="absent">', page)
     assert set(empty) <= {"events"}
     assert not re.search(r">nan<|\bNaN\b.*</svg>", page)
+    for caption in re.findall(r"<figcaption>(.*?)</figcaption>", page, re.DOTALL):
+        assert not re.search(r"\. +[a-z]+ ", re.sub("<[^>]*>", "", caption)), "a sentence begins small"
     return page
 
 
@@ -147,7 +149,7 @@ def test_a_team_is_shown_whole(two: Path) -> None:
     page = checked_page(two, "replay", "robots", "map", "events", "metrics", "robots-over-time")
     for k, name in enumerate(("anna", "bert")):
         assert f'id="map-show-robot-{k}"' in page
-        assert f"</span> {name}</span></th>" in page
+        assert f"</span>\u00a0{name}</th>" in page
     assert "0 of 2 robots succeeded" in page
     assert "anna: " in page
     assert "Of the whole team: metres driven" in page

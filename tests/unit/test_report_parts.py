@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,23 +15,30 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis, YAxis
+from matplotlib.figure import Figure
 from rich.console import Console
 from scipy.stats import chi2
 
 from pilotage.core.types import FloatArray
 from pilotage.missions.team import LARGEST_TEAM
+from pilotage.records.people import PeopleTracks
 from pilotage.records.run_data import read_run
 from pilotage.report import quantities, style, summary_table
 from pilotage.report.calibration.plots import MOST_BINS, histogram, panels_in_a_row
 from pilotage.report.event_kinds import event_kind
-from pilotage.report.figures.consistency import chi_square_band
+from pilotage.report.figures.close_ups import close_ups_figure
+from pilotage.report.figures.consistency import _statistic, chi_square_band
+from pilotage.report.figures.covariance import covariance_figure
 from pilotage.report.figures.layers import ellipse_outlines
+from pilotage.report.figures.map import map_figure
 from pilotage.report.figures.map_view import view_limits
 from pilotage.report.figures.placing import LabelPlacer, along
 from pilotage.report.headline import headline
-from pilotage.report.markup import Html, escape, table
+from pilotage.report.light_axes import LightAxes
+from pilotage.report.markup import Html, escape, page, table
 from pilotage.report.series import band, decimate, merge_spans, running_mean, spans
-from pilotage.report.team import colour_of
+from pilotage.report.team import colour_of, team_section
+from support.browser import Browser
 from support.fabricated_run import fabricate_metrics, fabricate_run, fabricate_world
 from support.pages import page_of
 
@@ -271,3 +279,59 @@ def test_ticks_that_nobody_styled_one_by_one_are_as_matplotlib_copies_them(
     monkeypatch.setattr(style, "LightAxes", Axes)
     assert drawn() == now
     assert len(copied) > 2 * before + 10
+
+
+def test_a_filter_that_is_far_too_modest_is_on_its_axis() -> None:
+    figure = Figure()
+    axes = figure.add_subplot(axes_class=LightAxes)
+    t_s, modest = np.arange(0.0, 50.0, 0.1), np.full(500, 0.004)
+    _statistic(axes, t_s, modest, np.full(500, 0.2), np.full(500, 9.3), 3.0, 100)
+    assert axes.get_ylim()[0] < 0.004
+    _statistic(axes, t_s, np.full(500, 2.9), np.full(500, 0.2), np.full(500, 9.3), 3.0, 100)
+    assert axes.get_ylim()[0] > 0.04
+
+
+def test_close_ups_are_as_large_as_the_body_asks_for(tmp_path: Path) -> None:
+    run = read_run(fabricate_run(tmp_path / "run"))
+    corners = np.array([[0.75, 0.3], [-0.25, 0.3], [-0.25, -0.3], [0.75, -0.3]])
+    car = replace(run.world.robots[0], polygon_m=corners, radius_m=0.85)
+    figure = close_ups_figure(replace(run, world=replace(run.world, robots=(car,))))
+    # Of the car's length, not of the circle about its rear axle that holds it.
+    assert "Windows of 6.00\u00a0m" in figure.caption
+    assert "Windows of 3.60\u00a0m" in close_ups_figure(run).caption
+
+
+def test_a_pose_that_was_given_is_sure_and_not_unrecorded(tmp_path: Path) -> None:
+    nothing = np.zeros(60)
+    given = dict.fromkeys(("cov_xx_m2", "cov_yy_m2", "cov_tt_rad2"), nothing)
+    figure = covariance_figure(read_run(fabricate_run(tmp_path / "run", steps=60, columns=given)))
+    assert "zero throughout" in figure.svg
+    assert "not recorded" not in figure.svg
+
+
+def test_pillars_alone_are_walls_in_the_legend(tmp_path: Path) -> None:
+    run = read_run(fabricate_run(tmp_path / "run"))
+    pillars = replace(run.world, segments_m=np.zeros((0, 4)), circles_m=np.array([[1.0, 1.0, 0.2]]))
+    assert "walls" in {key.label for key in map_figure(replace(run, world=pillars)).keys}
+
+
+def test_close_ups_show_who_was_there(tmp_path: Path) -> None:
+    run = read_run(fabricate_run(tmp_path / "run"))
+    x, y = run.trace["true_x_m"], run.trace["true_y_m"]
+    beside = np.stack([np.column_stack([x + 0.6, y]), np.column_stack([x + 500.0, y])], axis=1)
+    seen = close_ups_figure(replace(run, people=PeopleTracks(run.trace.t_s, beside, np.array([0.25, 0.25]))))
+    assert "people at that moment" in {key.label for key in seen.keys}
+    assert seen.svg.count('class="layer-people"') == 3, "one in each window, and nobody half a kilometre away"
+
+
+def test_a_robots_long_reason_leaves_its_numbers_in_sight(browser: Browser, tmp_path: Path) -> None:
+    reason = "stuck: gave up after 30 replans, the last because the laser shows no room for the command"
+    entry = {"success": False, "reason": reason, "path_length_m": 10.0, "position_rmse_m": 0.01}
+    each = {"a long name of the first of them": entry, "b": entry}
+    shown = page([team_section({"robots": each})], title="", eyebrow="", footer="")
+    file = tmp_path / "page.html"
+    file.write_text(shown, encoding="utf-8")
+    browser.size(900, 800)
+    browser.open(file, "document.querySelector('.robots')")
+    box = "document.querySelector('.robots').parentElement"
+    assert browser.js(f"{box}.scrollWidth <= {box}.clientWidth")

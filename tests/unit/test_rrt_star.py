@@ -263,6 +263,13 @@ def test_no_way_is_proven_without_a_search() -> None:
     assert result.iterations == 0
     width = float(result.reason.split("at most ")[1].split()[0])
     assert 0.38 <= width <= 0.48
+    assert "part them" not in result.reason
+
+
+def test_a_goal_behind_walls_without_a_gap_is_told_so() -> None:
+    result = plan(request(MUSEUM, (1.0, 1.0, 0.0), (30.0, 38.0, None)))
+    assert result.status is PlanStatus.NO_PATH
+    assert "walls part them, or the widest path" in result.reason
 
 
 def test_iterations_are_capped_and_the_budget_strikes() -> None:

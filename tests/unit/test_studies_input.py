@@ -78,6 +78,13 @@ def test_a_maps_image_decides_rows_wherever_it_is_found(tmp_path: Path, named: s
             "rows",
         ),
         (f"{{study: {'a' * 300}, mission: museum-plan}}", "200 characters"),
+        (f"{{study: {'ö' * 150}, mission: museum-plan}}", "200 bytes"),
+        (
+            "{study: two words, mission: museum-plan}",
+            "letters, digits, '-', '_' and '.', as it names a folder",
+        ),
+        ("{study: ../x, mission: museum-plan}", "as it names a folder, found '../x'"),
+        ("{study: x, mission: museum-plan, plugins: [a.py]}", "plugins: unknown key; a mission has it"),
     ],
 )
 def test_a_wrong_study_file_is_one_line(
@@ -89,6 +96,18 @@ def test_a_wrong_study_file_is_one_line(
     assert told in line
     assert "Übung eins.yaml" in line
     assert not (tmp_path / "out").exists()
+
+
+def test_a_study_of_a_mission_in_another_language_has_its_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("größte Übung.yaml").write_text("extends: museum-plan\n", encoding="utf-8")
+    assert main(["sweep", "größte Übung.yaml", "--trials", "1", "--workers", "1", "--no-report"]) == 0
+    capsys.readouterr()
+    (folder,) = Path("studies").iterdir()
+    assert folder.name.startswith("sweep-größte-Übung-")
+    assert main(["run", "--from", f"{folder.name}:0", "--no-report", "--json"]) == 0
 
 
 @pytest.mark.parametrize(

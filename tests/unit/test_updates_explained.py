@@ -17,7 +17,9 @@ from pilotage.experiments.run import run_mission
 from pilotage.experiments.update_album import UpdateAlbum
 from pilotage.records.run_data import read_run
 from pilotage.report import write_report
+from pilotage.report.figures import layers
 from pilotage.report.figures.layers import _cut_where_carried, true_path
+from pilotage.report.figures.updates import updates_figure
 from pilotage.sensors.readings import LidarScan, OdometryIncrement, Readings
 from pilotage.stack.interface import ExplainableUpdate, LineVerdict, ScanUpdate
 from pilotage.stack.localization.ekf_walls import EkfWallsConfig, EkfWallsLocalizer
@@ -128,6 +130,21 @@ def test_a_run_keeps_them_and_its_report_shows_them(by_walls: tuple[Path, str], 
     (damaged / "updates.npz").write_bytes(b"not an archive")
     with pytest.raises(InputError, match=r"updates\.npz"):
         read_run(damaged)
+
+
+def test_a_body_of_corners_is_drawn_around_its_base_and_not_around_its_laser(
+    by_walls: tuple[Path, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = read_run(by_walls[0])
+    corners = np.array([[0.75, 0.3], [-0.25, 0.3], [-0.25, -0.3], [0.75, -0.3]])
+    sightings = replace(run.sightings, mount=np.array([0.4, 0.0, 0.0]))
+    car = replace(run.world.robots[0], polygon_m=corners, radius_m=0.85)
+    drawn: list[tuple[float, float, object]] = []
+    monkeypatch.setattr(layers, "draw_body", lambda _, x, y, *__, polygon_m: drawn.append((x, y, polygon_m)))
+    updates_figure(replace(run, sightings=sightings, world=replace(run.world, robots=(car,))))
+    x, y, theta = run.updates[0].sensor_pose
+    assert drawn[0][:2] == pytest.approx((x - 0.4 * np.cos(theta), y - 0.4 * np.sin(theta)))
+    assert drawn[0][2] is corners
 
 
 def test_a_run_on_beacons_has_none(tmp_path: Path) -> None:

@@ -59,6 +59,13 @@ class RobotOutline:
     start: Pose | None = None
     goals: tuple[Pose, ...] = ()
 
+    @property
+    def half_length_m(self) -> float | None:
+        """A disc's radius, half of a polygon's longer side along its axes; None where unknown."""
+        if not len(self.polygon_m):
+            return self.radius_m
+        return 0.5 * float(np.ptp(self.polygon_m, axis=0).max())
+
 
 @dataclass(frozen=True, slots=True)
 class World:

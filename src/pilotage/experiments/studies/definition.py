@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from pilotage.core.config import Config
 from pilotage.experiments.studies.factors import Factor, check_plain, first_twice
 
+NAME = re.compile(r"[^\W_][\w.-]*")
+LONGEST_NAME = 200
+"""Names of studies, of letters of any language: of a folder, and in ``pilotage run --from NAME:ROW``."""
 CONFIGURATION = "configuration"
 """What the named configurations are called among the factors."""
 MANY = 1000
@@ -100,7 +104,7 @@ class StudyDefinition(Config):
         By metric, a bound or an optimum.
     """
 
-    study: str = Field(min_length=1, max_length=200, pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")
+    study: str = Field(min_length=1, max_length=LONGEST_NAME)
     question: str = ""
     description: str = ""
     mission: str = Field(min_length=1)
@@ -118,6 +122,15 @@ class StudyDefinition(Config):
     contrasts: tuple[Contrast, ...] = ()
     published: tuple[Published, ...] = ()
     reference: Mapping[str, Reference] = {}
+
+    @field_validator("study")
+    @classmethod
+    def _names_a_folder(cls, name: str) -> str:
+        if not NAME.fullmatch(name):
+            raise ValueError("expected letters, digits, '-', '_' and '.', as it names a folder")
+        if len(name.encode()) > LONGEST_NAME:
+            raise ValueError(f"expected at most {LONGEST_NAME} bytes, as it names a folder")
+        return name
 
     @model_validator(mode="before")
     @classmethod

@@ -28,6 +28,7 @@ from pilotage.experiments.studies.files import digests
 from pilotage.experiments.studies.groups import cell_groups
 from pilotage.experiments.studies.labels import labelled
 from pilotage.experiments.values import parse_yaml
+from pilotage.missions.mission import Mission
 from pilotage.records.folder import STUDY_FILE, is_study_folder
 
 SHIPPED = resources.files("pilotage.missions") / "studies"
@@ -144,6 +145,9 @@ def load_study(
     else:
         raise unknown_name("study", name_or_path, shipped_studies())
     try:
+        of_a_mission = Mission.model_fields.keys() - StudyDefinition.model_fields.keys()
+        for key in sorted(of_a_mission & values.keys()):
+            raise InputError(f"{key}: unknown key; a mission has it: put it there, or under 'set'")
         definition = validate(StudyDefinition, {**values, **(changes or {})}, "")
         return make_study(definition, folder, recorded=recorded)
     except InputError as error:

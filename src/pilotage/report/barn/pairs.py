@@ -87,7 +87,7 @@ def replay_link(link: str | None) -> Html:
 
 def percent(share: float) -> str:
     """A share in percent, one digit after the point."""
-    return f"{100.0 * share:.1f} %"
+    return f"{100.0 * share:.1f}\u00a0%"
 
 
 def counted(count: int, noun: str) -> str:
@@ -108,4 +108,4 @@ def interval(low: float, high: float, digits: int, sign: str = "") -> str:
 
 def seconds(value: float, digits: int) -> str:
     """A time with its unit; a dash for none, as where nobody arrived."""
-    return f"{value:.{digits}f} s" if math.isfinite(value) else "–"
+    return f"{value:.{digits}f}\u00a0s" if math.isfinite(value) else "–"

@@ -40,7 +40,7 @@ TITLE = "Close-ups"
 MOST = 3
 PATH_S = 30.0
 LEAST_ROWS = 10
-_LEFT_PT, _RIGHT_PT, _TOP_PT, _BOTTOM_PT, _GAP_PT = 24.0, 4.0, 20.0, 22.0, 28.0
+_LEFT_PT, _RIGHT_PT, _TOP_PT, _BOTTOM_PT, _GAP_PT = 24.0, 10.0, 20.0, 22.0, 28.0
 # What went wrong is worth more than what went well.
 _SHOWN_EVENTS = ("collision", "failed", "stuck", "escape", "avoid-start", "replan", "hall")
 
@@ -61,11 +61,11 @@ def close_ups_figure(run: RunData) -> Illustration:
     if not moments:
         return Illustration(SLUG, TITLE, "", "The run recorded no true path to look at closely.")
     radius = run.outline.radius_m or 0.3
-    least_m = 6.0 * radius
+    least_m = 6.0 * (run.outline.half_length_m or 0.3)
     # Coordinates of four digits need room.
     digits_pt = 14.0 if max(np.abs(path[moment.step]).max() for moment in moments) >= 1000.0 else 0.0
-    left_pt, gap_pt = _LEFT_PT + digits_pt, _GAP_PT + digits_pt
-    side = (WIDTH_PT - left_pt - _RIGHT_PT - (MOST - 1) * gap_pt) / MOST
+    left_pt, right_pt, gap_pt = _LEFT_PT + digits_pt, _RIGHT_PT + 0.5 * digits_pt, _GAP_PT + digits_pt
+    side = (WIDTH_PT - left_pt - right_pt - (MOST - 1) * gap_pt) / MOST
     total = side + _TOP_PT + _BOTTOM_PT
     figure = Figure(figsize=(WIDTH_PT / 72.0, total / 72.0))
     for index, moment in enumerate(moments):
@@ -82,6 +82,7 @@ def close_ups_figure(run: RunData) -> Illustration:
         axes.set_title(moment.title, fontsize=9.0)
         axes.locator_params(nbins=5)
         _draw(axes, _window(run, x, y, half_m, moment.step), run, moment.step, radius)
+        layers.draw_people(axes, run, float(run.trace.t_s[moment.step]), half_m, x, y)
     sides = [quantities.length(2.0 * max(least_m, 1.3 * moment.error_m)) for moment in moments]
     caption = (
         f"{'Windows' if len(sides) > 1 else 'A window'} of {' and '.join(dict.fromkeys(sides))}, in metres "
@@ -96,6 +97,7 @@ def close_ups_figure(run: RunData) -> Illustration:
         (bool(run.plans), Key("first plan", SKY, "band")),
         (len(run.plans) > 1, Key("replans", PURPLE, "band")),
         (run.world.has_obstacles, Key("unexpected obstacle", ORANGE, "band", opacity=1.0)),
+        (len(run.people.t_s) > 0, Key("people at that moment", layers.PEOPLE_COLOUR, "spot")),
         (len(run.mapped_points_m) > 0, Key("mapped by the robot", BLACK, "spot")),
     )
     keys = tuple(key for there, key in candidates if there)

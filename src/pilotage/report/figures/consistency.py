@@ -126,7 +126,10 @@ def _statistic(
     window: int,
 ) -> None:
     """Draw one statistic with its band, its ideal and its running mean on a logarithmic axis."""
-    floor = ideal / 60.0
+    smooth = running_mean(values, window)
+    # What is typical is on the axis, also of a filter that is far too modest.
+    known = smooth[smooth > 0.0]
+    floor = float(np.clip(0.5 * known.min() if known.size else ideal, 1e-4 * ideal, ideal / 60.0))
     # Beyond a thousand times the ideal the filter is lost, and how lost is not read off this panel.
     ceiling = float(np.clip(1.3 * np.nanmax(values), 4.0 * ideal, 1e3 * ideal))
     logarithmic(axes, floor, ceiling)
@@ -137,7 +140,7 @@ def _statistic(
     )
     axes.axhline(ideal, color=GREEN, linewidth=0.9, linestyle=(0, (5, 3)))
     series(axes, t_s, np.clip(values, floor, None), SKY, linewidth=0.5)
-    series(axes, t_s, running_mean(values, window), INK, linewidth=1.2)
+    series(axes, t_s, smooth, INK, linewidth=1.2)
 
 
 def measured(run: RunData) -> str:

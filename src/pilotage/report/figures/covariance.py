@@ -41,6 +41,7 @@ def covariance_figure(run: RunData) -> Illustration:
         * np.sqrt(np.where(trace[column] > 0.0, trace[column], np.nan))
         for name, column in (("x", "cov_xx_m2"), ("y", "cov_yy_m2"), ("heading", "cov_tt_rad2"))
     }
+    recorded = {"x": trace.has("cov_xx_m2"), "heading": trace.has("cov_tt_rad2")}
     colours = {"x": BLUE, "y": ORANGE, "heading": PURPLE}
     units = {"x": unit, "y": unit, "heading": "mrad"}
     figure, panels = stacked_axes([f"σ of x and y [{unit}]", "σ of heading [mrad]"], (130.0, 95.0))
@@ -50,7 +51,7 @@ def covariance_figure(run: RunData) -> Illustration:
         together = np.concatenate([sigmas[name] for name in names])
         together = together[np.isfinite(together)]
         if not together.size:
-            note(axes, "not recorded")
+            note(axes, "zero throughout" if recorded[names[0]] else "not recorded")
             continue
         logarithmic(axes, float(together.min()) / 1.2, float(together.max()) * 1.2)
         shade(axes, turns, SHADE)

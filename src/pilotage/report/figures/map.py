@@ -127,7 +127,10 @@ def _keys(run: RunData, magnification: int) -> tuple[Key, ...]:
         (bool(world.landmarks), Key("beacons", GREEN, "spot", "beacons")),
         (magnification > 0, Key("95 % ellipses to scale", BLACK, "line", "ellipses")),
         (magnification > 1, Key(f"ellipses magnified {magnification} ×", SKY, "band", "magnified")),
-        (run.grid is None and len(world.segments_m) > 0, Key("walls", INK, "line", "walls")),
+        (
+            run.grid is None and len(world.segments_m) + len(world.circles_m) > 0,
+            Key("walls", INK, "line", "walls"),
+        ),
         (run.grid is not None, Key("grid: occupied", OCCUPIED_COLOUR, "band", "grid", 1.0)),
         (has_unknown(run.grid), Key("grid: unknown", UNKNOWN_COLOUR, "band", opacity=1.0)),
     )

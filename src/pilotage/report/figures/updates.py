@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.path import Path as Outline
 
 from pilotage.core.scan_update import LineVerdict
-from pilotage.core.types import FloatArray
+from pilotage.core.types import FloatArray, Pose2
 from pilotage.records.run_data import RunData
 from pilotage.records.updates import RecordedUpdate
 from pilotage.report.figures import layers
@@ -81,8 +81,8 @@ def updates_figure(run: RunData) -> Illustration:
         "does not lie on a wall yet is what the update mends. Points are coloured by cluster, those of none "
         "(small clusters, no return) grey; a numbered line runs along the points that it was fitted to, and "
         "the wall that it was matched to is green. The list gives each line's squared Mahalanobis distance "
-        "from its wall (chi-square, two degrees of freedom) against the gate, and what became of it. The "
-        "disc is the robot before, the ring after. Shown are the first update, those with most lines left "
+        "from its wall (chi-square, two degrees of freedom) against the gate, and what became of it. Blue "
+        "is the robot before, its outline after. Shown are the first update, those with most lines left "
         "out, the farthest line that was still accepted, and some on the way."
     )
     candidates = (
@@ -119,10 +119,13 @@ def _panel(axes: Axes, run: RunData, update: RecordedUpdate, width_pt: float) ->
         colour = FAINT if label < 0 else CLUSTER_COLOURS[int(label) % len(CLUSTER_COLOURS)]
         _dots(axes, update.points_m[update.clusters == label], scale, colour, 6.0 if label < 0 else 6.1)
     layers.segments(axes, update.ends_m, "lines", color=BLACK, linewidth=0.8, zorder=7)
-    radius = run.world.robot_radius_m or 0.3
-    before, after = update.sensor_pose, update.sensor_pose_after
-    for (x, y, theta), colour, filled in ((before, SKY, True), (after, INK, False)):
-        layers.draw_body(axes, float(x), float(y), float(theta), radius, colour, filled, 0.6)
+    radius, polygon_m = run.outline.radius_m or 0.3, run.outline.polygon_m
+    to_base = Pose2.from_array(run.sightings.mount).inverse()
+    for sensor, colour, filled in ((update.sensor_pose, SKY, True), (update.sensor_pose_after, INK, False)):
+        base = Pose2.from_array(sensor).compose(to_base)
+        layers.draw_body(
+            axes, base.x_m, base.y_m, base.theta_rad, radius, colour, filled, 0.6, polygon_m=polygon_m
+        )
     _badges(axes, update, limits, scale)
     # Walls go on beyond the panel: drawn there, they would cross its neighbours.
     for artist in axes.get_children():

@@ -82,7 +82,7 @@ class ReplayMap {
 
   fit() {
     const [x0, y0, x1, y1] = this.scene.bounds_m;
-    const words = 36;  // what is said of the moment stands above the map, not on it
+    const words = 46;  // what is said of the moment stands above the map and its labels, not on them
     this.scale = 0.94 * Math.min(this.width / (x1 - x0), (this.height - words) / (y1 - y0));
     this.x = (x0 + x1) / 2;
     this.y = (y0 + y1) / 2 + words / 2 / this.scale;
@@ -341,7 +341,9 @@ class ReplayMap {
     pen.font = "11px system-ui, sans-serif";
     pen.textAlign = "left";
     pen.textBaseline = "middle";
-    const taken = [];  // labels without a corner that is free are left out; zooming in brings them back
+    // Labels without a corner that is free are left out; zooming in brings them back.
+    const [, ruler_px] = this.ruler(), taken = [[12, this.height - 30, 12 + ruler_px, this.height - 10]];
+    const cut = (box) => box[0] < 0 || box[1] < 0 || box[2] > this.width || box[3] > this.height;
     for (const layer of this.scene.marks) {
       if (!this.shows(layer)) continue;
       pen.fillStyle = pen.strokeStyle = this.colour(layer.colour);
@@ -362,11 +364,11 @@ class ReplayMap {
         else if (layer.look === "cross") { pen.moveTo(x - 5, y - 5); pen.lineTo(x + 5, y + 5); pen.moveTo(x + 5, y - 5); pen.lineTo(x - 5, y + 5); }
         else { pen.moveTo(x, y - 5); pen.lineTo(x + 5, y); pen.lineTo(x, y + 5); pen.lineTo(x - 5, y); pen.fill(); }
         if (layer.look === "ring" || layer.look === "cross") pen.stroke();
-        const width = 2 + 7 * label.length;
+        const width = 2 + pen.measureText(label).width;
         const spots = [[x + 8, y - 7], [x + 8, y + 7], [x - 8 - width, y - 7], [x - 8 - width, y + 7]];
         for (const [left, middle] of spots) {
           const box = [left, middle - 6, left + width, middle + 6];
-          if (taken.some((o) => o[0] < box[2] && box[0] < o[2] && o[1] < box[3] && box[1] < o[3])) continue;
+          if (cut(box) || taken.some((o) => o[0] < box[2] && box[0] < o[2] && o[1] < box[3] && box[1] < o[3])) continue;
           taken.push(box);
           pen.fillText(label, left, middle);
           break;
@@ -420,10 +422,15 @@ class ReplayMap {
     pen.stroke();
   }
 
-  drawRuler(pen) {
+  // A round length and its width on the screen.
+  ruler() {
     const wanted = 90 / this.scale, power = 10 ** Math.floor(Math.log10(wanted));
     const length = power * [1, 2, 5].filter((step) => step * power <= wanted).pop();
-    const x = 12, y = this.height - 12, w = length * this.scale;
+    return [length, length * this.scale];
+  }
+
+  drawRuler(pen) {
+    const [length, w] = this.ruler(), x = 12, y = this.height - 12;
     pen.strokeStyle = pen.fillStyle = this.colour("muted");
     pen.lineWidth = 1.5;
     pen.beginPath();

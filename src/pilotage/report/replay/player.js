@@ -28,6 +28,8 @@ class ReplayPlayer {
     this.map = new ReplayMap(this.find("map"), scene, colours);
     this.series = new ReplaySeries(this.find("series"), scene, colours);
     if (!scene.series.length) this.find("series").remove();
+    this.ellipses = this.map.axes.some((pair) => pair[0] > 0);
+    if (!this.ellipses) this.find("exaggerate").parentElement.remove();
     this.fillLayers();
     this.fillEvents();
     this.listen();
@@ -40,7 +42,7 @@ class ReplayPlayer {
     const width = this.map.width;
     this.map.resize();
     // Who has chosen a view keeps it.
-    if (first || (Math.abs(width - this.map.width) > 1 && !this.zoomed && !this.follow)) this.map.fit();
+    if (first || (Math.abs(width - this.map.width) > 1 && !this.chosen && !this.zoomed && !this.follow)) this.map.fit();
     if (this.scene.series.length) this.series.resize();
     this.draw();
   }
@@ -97,9 +99,8 @@ class ReplayPlayer {
     this.find("state").style.borderColor = colour || "transparent";
     const absent = this.scene.poses.filter((track) => track.absent && track.x_m[i] !== track.x_m[i]);
     put("absent", absent.map((track) => track.absent).join(", "));
-    const ellipses = this.scene.poses.some((track) => track.cov_m2);
-    const factor = ellipses ? this.map.factor() : 1;
-    put("factor", ellipses && !absent.length && factor !== 1 ? `ellipse × ${factor}` : "");
+    const factor = this.ellipses ? this.map.factor() : 1;
+    put("factor", this.ellipses && !absent.length && factor !== 1 ? `ellipse × ${factor}` : "");
     const event = this.eventAt(this.t);
     put("event", event ? `${saidTime(event.t_s, this.span)} · ${event.kind}: ${event.text}` : "");
     this.find("event").style.borderColor = event ? event.colour : "transparent";
@@ -179,7 +180,7 @@ class ReplayPlayer {
     this.find("play").addEventListener("click", () => this.play(!this.playing));
     this.find("scrub").addEventListener("input", (event) => this.seek(Number(event.target.value)));
     this.find("speed").addEventListener("change", (event) => { this.speed = Number(event.target.value); });
-    this.find("exaggerate").addEventListener("change", (event) => { this.map.exaggeration = event.target.value; this.draw(); });
+    if (this.ellipses) this.find("exaggerate").addEventListener("change", (event) => { this.map.exaggeration = event.target.value; this.draw(); });
     this.find("follow").addEventListener("change", (event) => this.setFollow(event.target.checked));
     this.find("fit").addEventListener("click", () => this.fit());
     this.find("in").addEventListener("click", () => this.zoom(1.5));
@@ -189,7 +190,7 @@ class ReplayPlayer {
     if (this.scene.series.length) this.listenSeries(this.find("series"));
   }
 
-  fit() { this.setFollow(false); this.zoomed = false; this.map.fit(); this.draw(); }
+  fit() { this.setFollow(false); this.zoomed = this.chosen = false; this.map.fit(); this.draw(); }
 
   zoom(by, x, y) {
     this.zoomed = true;
@@ -243,6 +244,7 @@ class ReplayPlayer {
         this.zoom(after.d / Math.max(before.d, 1), after.x, after.y);
       } else if (fingers.size === 1) {
         if (this.follow) this.setFollow(false);
+        this.chosen = true;
         this.map.pan(now[0] - old[0], now[1] - old[1]);
         this.draw();
       }

@@ -144,9 +144,10 @@ class ReplaySeries {
     pen.fillStyle = this.colours.ink;
     this.scene.series.forEach((series, k) => {
       const value = series.values[i];
-      const said = [!series.unit && Number.isInteger(value) ? String(value) : this.number(value)];
-      if (series.band) said.push(`${series.band_name} ${this.number(series.band[i])}`);
-      if (series.other) said.push(`${series.other_name} ${this.number(series.other[i])}`);
+      const digits = this.digits(series);
+      const said = [!series.unit && Number.isInteger(value) ? String(value) : this.number(value, digits)];
+      if (series.band) said.push(`${series.band_name} ${this.number(series.band[i], digits)}`);
+      if (series.other) said.push(`${series.other_name} ${this.number(series.other[i], digits)}`);
       // Beside the title there may be room for the value only.
       const title = pen.measureText(this.title(series)).width * 1.15 + 16;
       while (said.length > 1 && title + pen.measureText(said.join(" · ")).width > this.width - this.right) said.pop();
@@ -156,5 +157,14 @@ class ReplaySeries {
 
   title(series) { return series.unit ? `${series.title} [${series.unit}]` : series.title; }
 
-  number(v) { return v === v ? v.toFixed(Math.abs(v) < 0.1 ? 4 : 2) : "–"; }
+  // Decimals of small values: three digits of the panel's largest one, so that what is tiny all along is told.
+  digits(series) {
+    if (series.digits === undefined) {
+      const size = Math.max(this.top(series), -this.low(series));
+      series.digits = Math.min(Math.max(2 - Math.floor(Math.log10(size)), 4), 20);
+    }
+    return series.digits;
+  }
+
+  number(v, digits) { return v === v ? (v === 0 ? "0" : v.toFixed(Math.abs(v) < 0.1 ? digits : 2)) : "–"; }
 }

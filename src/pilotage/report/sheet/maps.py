@@ -58,7 +58,8 @@ def accuracy_figure(run: RunData) -> Illustration:
     ]
     caption = (
         "Left: the cells that the robot was in, and its own visited layer, which line and border marks do "
-        "not overwrite. Right: its OBSTACLE and LINE cells against the true ones. " + ", ".join(shares) + "."
+        "not overwrite. Right: its OBSTACLE and LINE cells against the true ones."
+        + (f" In numbers: {', '.join(shares)}." if shares else "")
     )
     alt = "Two maps of cells: visited and feature cells that the robot's map has right, missed and wrong"
     return Illustration(slug, title, alt, caption, render(figure, slug, alt), ACCURACY_KEYS)

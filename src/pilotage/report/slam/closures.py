@@ -107,7 +107,7 @@ def _row(c: ClosureRow) -> tuple[str, ...]:
         f"±{c.window_m:.1f} m",
         f"{c.score:.2f}",
         f"{c.second_score:.2f}",
-        f"{c.agreement:.0%}",
+        f"{100.0 * c.agreement:.0f}\u00a0%",
         "–" if c.chi_square is None else f"{c.chi_square:.1f}",
         str(c.support),
         c.verdict,
@@ -121,8 +121,8 @@ def _said(c: ClosureRow) -> str:
     why = f" ({MEANINGS[c.verdict]})" if c.verdict in MEANINGS else ""
     return (
         f"scans {earlier} and {c.later_scan}, window ±{c.window_m:.1f} m, score {c.score:.2f} "
-        f"(second {c.second_score:.2f}), agreement {c.agreement:.0%}{chi}, seconded by {c.support}: "
-        f"{c.verdict}{why}"
+        f"(second {c.second_score:.2f}), agreement {100.0 * c.agreement:.0f}\u00a0%{chi}, "
+        f"seconded by {c.support}: {c.verdict}{why}"
     )
 
 

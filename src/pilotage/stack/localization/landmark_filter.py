@@ -76,7 +76,10 @@ Update = Callable[..., tuple[int, FloatArray, IntArray]]
 def known_landmarks(chart: WorldMap, name: str) -> sighting.Known:
     """The landmarks of the robot's map; InputError without any."""
     if len(chart.landmarks) == 0:
-        raise InputError(f"{name}: expected a map with landmarks, found none")
+        raise InputError(
+            f"{name}: expected a map with landmarks, found none; add some (world.landmarks, --landmarks) "
+            "or localize by a laser (particle-filter)"
+        )
     return chart.landmarks.by_id()
 
 

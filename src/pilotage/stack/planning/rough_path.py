@@ -24,13 +24,15 @@ NO_GUIDE = np.zeros((0, 3))
 class Around(NamedTuple):
     """A rough path to the goal (K, 3), a lower bound of the cost-to-go, and whether there is no path at all.
 
-    ``widest_m``: what the path keeps that keeps most, where there is none that keeps what is asked for.
+    ``widest_m``: what the path keeps at most that keeps most, where there is none that keeps what is asked
+    for; ``parted``: as far as the field tells, walls without a gap may lie between start and goal.
     """
 
     guide_path: FloatArray
     bound: rrt_samples.Bound
     shut: bool = False
     widest_m: float = math.inf
+    parted: bool = False
 
 
 def look_around(
@@ -58,8 +60,11 @@ def look_around(
             for ij in (start, goal)
             for k, n in zip(ij, space.distance.shape, strict=True)
         ]
-        widest_m = guide.widest_way(space.distance, *ends) + space.resolution * math.sqrt(0.5)
-        return Around(NO_GUIDE, NO_BOUND, True, math.ceil(widest_m * 1000.0) / 1000.0)
+        # Of a wall without a gap some node on either side is as near as this.
+        unsure_m = space.resolution * math.sqrt(0.5)
+        widest_m = guide.widest_way(space.distance, *ends)
+        bound_m = math.ceil((widest_m + unsure_m) * 1000.0) / 1000.0
+        return Around(NO_GUIDE, NO_BOUND, True, bound_m, widest_m <= unsure_m)
     guide_path = guide.trace(move, space, stride, *start, 3) if guided else NO_GUIDE
     if not bounded:
         return Around(guide_path, NO_BOUND)

@@ -187,10 +187,11 @@ class RrtStarDubinsPlanner:
 
 
 def _shut(around: Around, clearance_m: float) -> str:
-    """The proof that no path keeps the clearance, and what the widest one keeps."""
+    """The proof that no path keeps the clearance, and what the widest one keeps, if there is one."""
     proof = f"no path from start to goal keeps {clearance_m:g} m from the obstacles"
     if around.widest_m < clearance_m:
-        proof += f": the widest path needs a clearance of at most {around.widest_m:g} m"
+        proof += ": walls part them, or " if around.parted else ": "
+        proof += f"the widest path needs a clearance of at most {around.widest_m:g} m"
     return f"{proof} (clearance_m; a narrow body can do with less)"
 
 
