@@ -13,6 +13,8 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from pilotage.experiments.studies import local_workers, trial
 from pilotage.experiments.studies.trial import Outcome
 
@@ -71,6 +73,6 @@ def misbehave(how: str) -> None:
     elif how == "swell":
         held = []
         while True:
-            held.append(bytearray(1 << 28))
+            held.append(np.empty(1 << 28, np.uint8))  # not written to: two gigabytes take seconds to fill
     elif how == "slow":
         time.sleep(600)

@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from pilotage.kernels.arrays import FloatArray
+from pilotage.kernels.arrays import FloatArray, IntArray
 from pilotage.kernels.jit import kernel
 from pilotage.kernels.slam.match_grid import ScoreArray
 
@@ -31,16 +31,38 @@ def _at(grid: ScoreArray, cells: NDArray[np.int32], k: int, column: int, row: in
 
 
 @kernel
-def _score(grid: ScoreArray, cells: NDArray[np.int32], column: int, row: int, least: float) -> float:
+def _score(
+    grid: ScoreArray,
+    cells: NDArray[np.int32],
+    places: NDArray[np.uint32],
+    box: IntArray,
+    column: int,
+    row: int,
+    least: float,
+) -> float:
     """Sum of the scores of cells (2, K) shifted by whole cells; a bound of it where not above ``least``.
 
     A score is 1 at most: after some of the points the rest may be known not to suffice. Four sums side by
     side, as one would wait for each addition; scores are single and sums double, so that their order does
-    not count.
+    not count. ``box`` (4,) are the cells' least and greatest column and row, ``places`` (K,) their numbers
+    row by row from there: where the box lies inside the grid no cell is held against its borders.
     """
     count = cells.shape[1]
     a = b = c = d = 0.0
     k = 0
+    rows, columns = grid.shape
+    if box[0] + column >= 0 and box[1] + column < columns and box[2] + row >= 0 and box[3] + row < rows:
+        scores = grid.reshape(-1)[(box[2] + row) * columns + box[0] + column :]
+        while k + 4 <= count:
+            for _ in range(min(_LOOK_EVERY, (count - k) // 4)):
+                a += float(scores[places[k]])
+                b += float(scores[places[k + 1]])
+                c += float(scores[places[k + 2]])
+                d += float(scores[places[k + 3]])
+                k += 4
+            most: float = a + b + c + d + (count - k)
+            if most <= least:
+                return most
     while k + 4 <= count:
         for _ in range(min(_LOOK_EVERY, (count - k) // 4)):
             a += _at(grid, cells, k, column, row)
@@ -48,7 +70,7 @@ def _score(grid: ScoreArray, cells: NDArray[np.int32], column: int, row: int, le
             c += _at(grid, cells, k + 2, column, row)
             d += _at(grid, cells, k + 3, column, row)
             k += 4
-        most: float = a + b + c + d + (count - k)
+        most = a + b + c + d + (count - k)
         if most <= least:
             return most
     for m in range(k, count):
@@ -120,6 +142,8 @@ def search_window(
     roots_side = (width + stride - 1) // stride
     roots = angles_rad.shape[0] * roots_side * roots_side
     cells = np.empty((angles_rad.shape[0], 2, count), np.int32)
+    places = np.empty((angles_rad.shape[0], count), np.uint32)  # without a sign: none is counted from the end
+    boxes = np.empty((angles_rad.shape[0], 4), np.int64)
     bounds = np.empty(roots)
     nodes = 0
     for a in range(angles_rad.shape[0]):
@@ -134,6 +158,10 @@ def search_window(
                 cells[a, 0, k] = math.floor((x - corner_x) / cell_m) - reach + margin
                 cells[a, 1, k] = math.floor((y - corner_y) / cell_m) - reach + margin
                 k += 1
+        boxes[a, 0], boxes[a, 1] = cells[a, 0].min(), cells[a, 0].max()
+        boxes[a, 2], boxes[a, 3] = cells[a, 1].min(), cells[a, 1].max()
+        for k in range(count):
+            places[a, k] = (cells[a, 1, k] - boxes[a, 2]) * pyramid.shape[2] + cells[a, 0, k] - boxes[a, 0]
     least = least_score * count
     if seed[0] == seed[0]:
         a = int(np.argmin(np.abs(angles_rad - (seed[2] - centre[2]))))
@@ -141,11 +169,15 @@ def search_window(
         row = round((seed[1] - centre[1]) / cell_m) + reach
         if 0 <= column < width and 0 <= row < width:
             # A little less, for that pose itself to be found.
-            least = max(least, _score(pyramid[0], cells[a], column, row, least) - SEED_LESS)
+            least = max(
+                least, _score(pyramid[0], cells[a], places[a], boxes[a], column, row, least) - SEED_LESS
+            )
     for a in range(angles_rad.shape[0]):
         for i in range(roots_side * roots_side):
             column, row = (i % roots_side) * stride, (i // roots_side) * stride
-            bounds[a * roots_side * roots_side + i] = _score(pyramid[levels], cells[a], column, row, least)
+            bounds[a * roots_side * roots_side + i] = _score(
+                pyramid[levels], cells[a], places[a], boxes[a], column, row, least
+            )
             nodes += 1
     order = np.argsort(-bounds)
     # Of each level at most three children wait while the fourth is looked into.
@@ -191,7 +223,7 @@ def search_window(
                 cc, rr = column + (child % 2) * half, row + (child // 2) * half
                 if cc >= width or rr >= width:
                     continue
-                value = _score(pyramid[level - 1], cells[a], cc, rr, least)
+                value = _score(pyramid[level - 1], cells[a], places[a], boxes[a], cc, rr, least)
                 nodes += 1
                 if value <= least:
                     continue
