@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import math
+
+import numpy as np
+
 from pilotage.core.errors import InputError
 from pilotage.core.types import Twist
 from pilotage.maps.world_map import WorldMap
@@ -16,12 +20,14 @@ from pilotage.stack.navigator.patrol.config import PatrolNavigatorConfig
 from pilotage.stack.navigator.patrol.context import Context
 from pilotage.stack.navigator.patrol.paths import roadmap_for
 from pilotage.stack.navigator.patrol.precedence import Leading, precedence
+from pilotage.stack.navigator.patrol.senses import SIGMAS
 from pilotage.stack.navigator.patrol.states import transitions
 from pilotage.stack.navigator.patrol.states.charging import Charging
 from pilotage.stack.navigator.patrol.states.driving import Waiting
 from pilotage.stack.navigator.patrol.states.lost import Lost
 from pilotage.stack.navigator.patrol.states.state import State
 from pilotage.stack.navigator.wandering import Wandering
+from pilotage.stack.patrol.task import PatrolTask
 
 COLUMNS = {
     "mode": "1",
@@ -69,7 +75,10 @@ class PatrolNavigator:
                 f"{robot.motion.least_turning_radius_m:.2f} m; take robot.motion.name: differential-drive"
             )
         self._localizer = localizer_of(parts, "patrol")
-        self._tell_mates = Abilities.of(self._localizer).tell_mates
+        able = Abilities.of(self._localizer)
+        if not able.on_map:
+            _check_start(task.initial, parts.patrol)
+        self._tell_mates = able.tell_mates
         self._telemetry = journal.channel(COLUMNS, first=True)
         journal.counts |= {"gave_way": 0, "alarms": 0}
         if parts.patrol.supply is not None:
@@ -132,3 +141,17 @@ class PatrolNavigator:
             *context.alarm,
         )
         return command
+
+
+def _check_start(start: Belief, task: PatrolTask) -> None:
+    """Refuse a start so vague that it passes by places; nothing that it senses mends that."""
+    x, y, cov = start.pose.x_m, start.pose.y_m, start.cov
+    away_m = float(np.hypot(*(task.graph.vertices_xy_m - (x, y)).T).max())
+    position_m, heading_rad = (SIGMAS * math.sqrt(cov.diagonal()[of].max()) for of in ([0, 1], [2]))
+    wrong_m = math.hypot(position_m, away_m * heading_rad)
+    if wrong_m > task.visit_m:
+        raise InputError(
+            "navigator 'patrol': expected a localizer that finds its place on the map, found one that keeps "
+            f"what it is wrong by at the start, up to {wrong_m:.1f} m at the farthest place to visit; take "
+            "stack.localizer: laser, or a stack.initial of smaller variances"
+        )
