@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from pilotage.core.errors import InputError
-from pilotage.core.types import Twist
+from pilotage.core.types import STOP, Twist
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.readings import Readings
 from pilotage.stack.control.last_word import LastWord
@@ -84,7 +84,7 @@ class PatrolNavigator:
         if parts.patrol.supply is not None:
             journal.counts["charges"] = 0
         self._context = Context(config, robot, chart, parts.patrol, task.initial.pose, journal)
-        self._last_word = LastWord(robot)
+        self._last_word, self._has_corners = LastWord(robot), not robot.footprint.is_disc
         self._wandering = Wandering(config.wander, robot, self._localizer, self._last_word)
         self._state: State | None = None
 
@@ -111,7 +111,7 @@ class PatrolNavigator:
         lost = belief.status is BeliefStatus.LOST
         context.sense(readings, belief, lost=lost)
         state, astray = self._state, lost or context.is_off_roadmap()
-        if astray:
+        if astray or self._has_corners:
             self._last_word.take_in(readings)  # else each of its commands leaves it room to stop anyway
         if astray and not isinstance(state, Lost):
             what = "does not know where it is" if lost else "finds no path from where it is"
@@ -140,7 +140,12 @@ class PatrolNavigator:
             len(context.strange),
             *context.alarm,
         )
-        return command
+        return command if not self._has_corners or self._corners_allow(command) else STOP
+
+    def _corners_allow(self, command: Twist) -> bool:
+        """Whether no corner swings into anybody: who comes on is soon inside the disc that it drives as."""
+        swings = command.v_m_s == 0.0 and command.w_rad_s != 0.0
+        return not (swings and self._context.motion.is_met) and self._last_word.allows(command)
 
 
 def _check_start(start: Belief, task: PatrolTask) -> None:
