@@ -133,6 +133,26 @@ def test_a_robot_told_nothing_and_one_carried_away_find_themselves() -> None:
     assert not carried.collisions
 
 
+@pytest.mark.parametrize(
+    ("off", "elsewhere"), [((0.0, 0.0, 0.0), False), ((7.0, -4.0, 0.0), True), ((0.0, 0.0, 1.5), True)]
+)
+def test_a_belief_is_none_where_scans_fit_better_in_two_places(
+    off: tuple[float, float, float], elsewhere: bool
+) -> None:
+    """Of rooms that look alike none could be told, and the filter believed what fitted for three seconds."""
+    field, bounds_m = field_of(HALL, cells=False)
+    again, pose = Relocalization(field, bounds_m), np.array([2.0, 6.0, 0.0])
+    for k in range(6):
+        again.see(seen_from(HALL, pose))
+        assert again.begin(1.0 * k, lost=True, mean=pose + off) is None
+        again.move(OdometryIncrement(0.5, 0.0))
+        pose = pose + np.array([0.5, 0.0, 0.0])
+    assert again.trial is None
+    assert again.elsewhere is elsewhere
+    again.begin(9.0, lost=False, mean=pose)
+    assert not again.elsewhere
+
+
 def test_a_trial_that_the_map_cannot_judge_ends() -> None:
     field, bounds_m = field_of(furnished(), cells=False)
     again = Relocalization(field, bounds_m)
@@ -159,3 +179,27 @@ def test_the_laser_localizer_takes_the_filter_that_suits_the_map() -> None:
         assert isinstance(found._localizer, kind)
         assert found.belief is told.initial
         assert found.look_bearing_rad() is None
+
+
+@pytest.mark.parametrize(
+    ("leap_m", "told", "elsewhere"), [(0.1, True, False), (4.0, True, True), (0.0, False, True)]
+)
+def test_who_settles_elsewhere_is_believed_by_a_trial_alone(
+    leap_m: float, told: bool, elsewhere: bool
+) -> None:
+    """A wide cloud took the twin of the true place, half a turn about the room's middle, for 100 s."""
+    field, bounds_m = field_of(HALL, cells=False)
+    again, pose = Relocalization(field, bounds_m, told), np.array([2.0, 6.0, 0.0])
+    if told:
+        again.begin(0.0, lost=False, mean=pose)
+    for k in range(4):
+        again.move(OdometryIncrement(0.1, 0.0))
+        pose = pose + np.array([0.1, 0.0, 0.0])
+        leap = np.array([leap_m if k == 1 else 0.0, 0.0, 0.0])
+        again.begin(0.1 * k, lost=True, mean=pose + leap)
+    assert again.elsewhere is elsewhere, "also once it is back"
+    again.trial = Trial()
+    while again.passed(0.9, 1.0, 0.9) is None:
+        again.move(OdometryIncrement(0.1, 0.0))
+    again.begin(9.0, lost=True, mean=pose)
+    assert not again.elsewhere

@@ -98,6 +98,18 @@ def test_who_chooses_its_places_is_refused_for_others(mission: str, changes: lis
         build(load_mission(mission, changes, 0))
 
 
+@pytest.mark.parametrize("localizer", ["slam", "dead-reckoning"])
+def test_who_never_looks_at_the_map_patrols_from_a_start_that_is_known(localizer: str) -> None:
+    """A heading told to 0.1 rad is metres at the far end, for good: robots stood before walls that were not
+    where they believed, "deadlocked from 38 s on"."""
+    start = ["x_var_m2", "y_var_m2", "theta_var_rad2"]
+    known = [f"stack.initial.{name}=0.00001" for name in start]
+    changes = [f"stack.localizer.name={localizer}", "team.size=1"]
+    build(load_mission("museum-patrol", [*changes, *known], 0))
+    with pytest.raises(InputError, match=r"up to \d+\.\d m at .*; take stack\.localizer: laser, or"):
+        build(load_mission("museum-patrol", changes, 0))
+
+
 @pytest.mark.parametrize(
     ("cells", "told"),
     [

@@ -197,6 +197,52 @@ def is_near_beside(
 
 
 @kernel
+def coming_on(
+    points: FloatArray,
+    before: FloatArray,
+    dt: float,
+    same: float,
+    slow: float,
+    radius: float,
+    gap: float,
+    reaction: float,
+    deceleration: float,
+) -> FloatArray:
+    """Those of returns (M, 2) that come on faster than who keeps its own half of the distance could stop.
+
+    How fast is told by the nearest of the returns (K, 2) of a scan before, ``dt`` earlier and in the same
+    frame, that are within ``same`` of one: the front of who comes. Of what has just come into sight nothing
+    is known, and what is as ``slow`` as this may stand.
+
+    Parameters
+    ----------
+    radius, gap
+        Of this robot, and what two keep between them.
+    reaction, deceleration
+        Of who comes, as ``safe_stop.stop_is_clear`` has them.
+    """
+    kept = np.empty_like(points)
+    count = 0
+    for i in range(points.shape[0]):
+        px, py = points[i, 0], points[i, 1]
+        least = np.inf
+        for k in range(before.shape[0]):
+            bx, by = before[k, 0], before[k, 1]
+            if (px - bx) * (px - bx) + (py - by) * (py - by) < same * same:
+                least = min(least, bx * bx + by * by)
+        away = math.hypot(px, py)
+        if not (least < np.inf and math.sqrt(least) > away):
+            continue
+        speed = (math.sqrt(least) - away) / dt
+        if speed > slow and speed * reaction + 0.5 * speed * speed / deceleration > 0.5 * max(
+            away - radius - gap, 0.0
+        ):
+            kept[count] = points[i]
+            count += 1
+    return kept[:count]
+
+
+@kernel
 def rotated(points: FloatArray, angle: float) -> FloatArray:
     """Points (K, 2) turned around the origin."""
     c, s = math.cos(angle), math.sin(angle)

@@ -77,7 +77,7 @@ class DeadReckoningLocalizer:
     as it says is the region of ``kernels/filters/bent_region.py``, told in the columns ``REGION_COLUMNS``.
     """
 
-    corrects = False
+    corrects = on_map = False
 
     def __init__(
         self,

@@ -69,6 +69,8 @@ class Abilities:
         The map that it draws; None where it draws none.
     corrects
         Whether anything that it senses corrects what it reckons.
+    on_map
+        Whether what it senses tells where on the robot's map it is; else what it began with stays wrong.
     close_loops, refine
         Of one that draws a map: look for loops here and now, how many closed; align all of it once more.
     """
@@ -77,6 +79,7 @@ class Abilities:
     tell_mates: Callable[[FloatArray], None] = _to_nobody
     scan_grid: ScanGrid | None = None
     corrects: bool = True
+    on_map: bool = True
     close_loops: Callable[[], int] = _no_loops
     refine: Callable[[], None] = _nothing
 
@@ -93,7 +96,7 @@ class WrappedLocalizer:
     def __init__(self, localizer: Localizer) -> None:
         self._localizer, able = localizer, Abilities.of(localizer)
         self.look_bearing_rad, self.tell_mates = able.look_bearing_rad, able.tell_mates
-        self.scan_grid, self.corrects = able.scan_grid, able.corrects
+        self.scan_grid, self.corrects, self.on_map = able.scan_grid, able.corrects, able.on_map
         self.close_loops, self.refine = able.close_loops, able.refine
 
     @property

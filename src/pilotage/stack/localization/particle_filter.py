@@ -163,7 +163,10 @@ class ParticleFilterLocalizer:
             random_share=config.random_share,
             reach_m=lidar.max_range_m,
         )
-        self._relocalization = Relocalization(self._field, chart.bounds_m) if config.relocalize else None
+        told = initial.status is not BeliefStatus.LOST
+        self._relocalization = (
+            Relocalization(self._field, chart.bounds_m, told) if config.relocalize else None
+        )
         self._picked = np.unique(np.linspace(0, lidar.beams - 1, min(config.beams, lidar.beams)).astype(int))
         angles = lidar.beam_angles_rad()[self._picked] + lidar.mount.theta_rad
         self._directions = np.column_stack([np.cos(angles), np.sin(angles)])
@@ -210,7 +213,8 @@ class ParticleFilterLocalizer:
         self._blind = bool(cov[2, 2] > LINEAR_RAD**2)
         lost = self._blind or self._check.lost(t_s)
         if self._relocalization is not None:
-            lost |= self._relocalization.trial is not None
+            # Where the last scans fit elsewhere those that fit here do so by chance.
+            lost |= self._relocalization.trial is not None or self._relocalization.elsewhere
             if isinstance(scan, LidarScan):
                 self._relocalization.see(seen)
             tried = self._relocalization.trial

@@ -18,6 +18,7 @@ from pilotage.stack.localization.scan_search import (
     MOST_SCANS,
     RecentScans,
     ScanSearch,
+    carried,
 )
 
 PATIENCE_S = 2.0
@@ -36,6 +37,8 @@ LEAST_USUAL = 0.6
 """What is usual at least: share of the beams on the map's walls."""
 SAME_M, SAME_RAD = 0.3, 0.15
 """A place so near to where the cloud is needs no other cloud."""
+STRAYS, TURNS_RAD_PER_M = 0.1, 0.02
+"""Share of its path that the odometry leads astray by, and how much it turns by the metre, at most."""
 STDS = np.array([0.1, 0.1, 0.02])
 """Of the cloud that begins at a place found."""
 
@@ -62,22 +65,36 @@ class Relocalization:
     ----------
     trial
         The place under trial, a new one or where the filter is anyway; None where there is none.
+    elsewhere
+        Whether the filter's place is none to be believed but after a trial: the last dozen scans fit clearly
+        better in another one, be it several; or it has left where its last trusted one leads by the odometry.
     """
 
-    def __init__(self, field: LikelihoodField, bounds_m: tuple[float, float, float, float]) -> None:
+    def __init__(
+        self, field: LikelihoodField, bounds_m: tuple[float, float, float, float], told: bool = True
+    ) -> None:
+        """Search a map; who was ``told`` no place at first has none to be trusted before a trial."""
         self._field, self._bounds_m = field, bounds_m
         self._search: ScanSearch | None = None  # its scores are made when they are needed first
         self._scans = RecentScans()
         self._since_s: float | None = None
         self._new = 0
         self.trial: Trial | None = None
+        self._fit_elsewhere, self._has_left = False, not told
+        self.elsewhere = self._has_left
+        self._trusted: FloatArray | None = None
+        self._path_m = 0.0
 
     def move(self, odometry: OdometryIncrement) -> None:
         """Carry everything along."""
-        self._scans.move(odometry.distance_m, odometry.lateral_m, odometry.angle_rad)
+        moved = odometry.distance_m, odometry.lateral_m, odometry.angle_rad
+        self._scans.move(*moved)
+        driven_m = math.hypot(odometry.distance_m, odometry.lateral_m)
+        path_m = driven_m + TURN_AS_PATH_M * abs(odometry.angle_rad)
+        if self._trusted is not None:
+            self._trusted, self._path_m = carried(self._trusted, *moved), self._path_m + path_m
         if self.trial is not None:
-            driven_m = math.hypot(odometry.distance_m, odometry.lateral_m)
-            self.trial.path_m += driven_m + TURN_AS_PATH_M * abs(odometry.angle_rad)
+            self.trial.path_m += path_m
             if self.trial.path_m > LONGEST_TRIAL_M:
                 self.trial = None
 
@@ -88,12 +105,16 @@ class Relocalization:
     def forget(self) -> None:
         """The odometry cannot be relied on: what was seen before joins nothing any more."""
         self._scans.forget()
+        self._trusted = None
 
     def begin(self, t_s: float, lost: bool, mean: FloatArray) -> FloatArray | None:
         """A place (3,) to begin anew at; None where none is found, or a trial of the filter's own began."""
         if not lost:
             self._since_s = self.trial = None
+            self._trust(mean)
             return None
+        self._has_left |= self._leaves(mean)
+        self.elsewhere = self._fit_elsewhere or self._has_left
         self._since_s = t_s if self._since_s is None else self._since_s
         waits = self.trial is not None or self._new < AGAIN_SCANS or len(self._scans) < LEAST_SCANS
         if waits or t_s - self._since_s < PATIENCE_S:
@@ -101,13 +122,16 @@ class Relocalization:
         self._new = 0
         if self._search is None:
             self._search = ScanSearch(self._field, self._bounds_m)
-        place = self._search.best(self._scans.cloud(FEW_SCANS))
+        cloud = self._scans.cloud(FEW_SCANS)
+        place = self._search.best(cloud)
+        self._fit_elsewhere = place is not None and not self._search.fits_as_well(mean, cloud, place)
+        self.elsewhere |= self._fit_elsewhere
         other = LEAST_SCANS if place is None else MOST_SCANS
         if (place is None or not place.alone) and len(self._scans) > min(other, FEW_SCANS):
             place = self._search.best(self._scans.cloud(other))
         if place is None or not place.alone:
             return None
-        self.trial = Trial()
+        self.trial, self._fit_elsewhere = Trial(), False
         off = place.pose - mean
         near = float(np.hypot(off[0], off[1])) < SAME_M and abs(wrap_to_pi(float(off[2]))) < SAME_RAD
         return None if near else place.pose
@@ -125,4 +149,25 @@ class Relocalization:
         if not enough:
             return None
         self.trial = None
-        return trial.fitting / trial.weight >= FITTING * float(np.fmax(usual, LEAST_USUAL))
+        passed = trial.fitting / trial.weight >= FITTING * float(np.fmax(usual, LEAST_USUAL))
+        if passed:
+            self._trust(None)
+        return passed
+
+    def _trust(self, place: FloatArray | None) -> None:
+        """From here on it is where this place (3,) leads; None: wherever it is."""
+        self._trusted, self._path_m = place, 0.0
+        self.elsewhere = self._fit_elsewhere = self._has_left = False
+
+    def _leaves(self, mean: FloatArray) -> bool:
+        """Whether a belief (3,) is not where the odometry leads from the last one that was trusted.
+
+        A wide cloud settles where scans fit, and of two places that look alike it takes either.
+        """
+        if self._trusted is None:
+            return False
+        off = mean - self._trusted
+        return (
+            math.hypot(off[0], off[1]) > SAME_M + STRAYS * self._path_m
+            or abs(wrap_to_pi(float(off[2]))) > SAME_RAD + TURNS_RAD_PER_M * self._path_m
+        )

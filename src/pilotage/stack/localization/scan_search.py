@@ -55,6 +55,14 @@ def _least_missed(score: float) -> float:
     return CLEARLY * max(PERFECT - score, 0.0) + CLEARLY_MORE
 
 
+def carried(pose: FloatArray, distance_m: float, lateral_m: float, angle_rad: float) -> FloatArray:
+    """A pose (3,) after an increment of the odometry."""
+    x, y, theta = pose.tolist()
+    x, y, theta = exact_arc(x, y, theta, distance_m, angle_rad)
+    c, s = math.cos(theta), math.sin(theta)
+    return np.array([x - s * lateral_m, y + c * lateral_m, theta])
+
+
 class RecentScans:
     """The last scans and where, by the odometry alone, they were taken from one another."""
 
@@ -71,10 +79,7 @@ class RecentScans:
 
     def move(self, distance_m: float, lateral_m: float, angle_rad: float) -> None:
         """Go on by an increment of the odometry."""
-        x, y, theta = self._here.tolist()
-        x, y, theta = exact_arc(x, y, theta, distance_m, angle_rad)
-        c, s = math.cos(theta), math.sin(theta)
-        self._here = np.array([x - s * lateral_m, y + c * lateral_m, theta])
+        self._here = carried(self._here, distance_m, lateral_m, angle_rad)
 
     def see(self, points: FloatArray) -> bool:
         """Keep a scan's end points (K, 2) in the robot's frame, where it is far enough from the last one."""
@@ -115,6 +120,7 @@ class ScanSearch:
         open_score = np.where(field.known_at(centres), OPEN_SCORE, 0.0)
         scores = np.where(away < 2.5 * STD_M, np.exp(-0.5 * (away / STD_M) ** 2), open_score)
         grid: ScoreArray = scores.reshape(rows, columns).astype(np.float32)
+        self._grid = grid
         self._pyramid, self._margin = max_pyramid(grid, LEVELS)
         self._middle = np.array([0.5 * (xmin + xmax), 0.5 * (ymin + ymax), 0.0])
         self._half_m = 0.5 * max(width, height)
@@ -123,7 +129,7 @@ class ScanSearch:
         """The best place for points (K, 2) in the robot's frame; None where they fit nowhere, or are few."""
         if len(points) < LEAST_POINTS:
             return None
-        points = np.ascontiguousarray(points[:: max(1, math.ceil(len(points) / MOST_POINTS))])
+        points = _some_of(points)
         found, whole = self._search(points, LEAST_SCORE, PASS_OVER_NONE)
         if not (whole and np.isfinite(found[3])):
             return None
@@ -135,6 +141,15 @@ class ScanSearch:
         other, whole = self._search(points, least, np.concatenate([found[:3], OTHER_PLACE]))
         rival = score if not whole else float(other[3]) if np.isfinite(other[3]) else 0.0
         return Place(found[:3].copy(), score, rival)
+
+    def fits_as_well(self, pose: FloatArray, points: FloatArray, best: Place) -> bool:
+        """Whether points (K, 2) fit from a pose (3,) about as well as from the best place for them."""
+        c, s = math.cos(pose[2]), math.sin(pose[2])
+        placed = pose[:2] + _some_of(points) @ np.array([[c, s], [-s, c]])
+        column, row = np.floor((placed - self._corner) / self._cell_m).astype(np.int64).T
+        inside = (row >= 0) & (column >= 0) & (row < self._grid.shape[0]) & (column < self._grid.shape[1])
+        score = float(self._grid[row[inside], column[inside]].sum()) / len(placed)
+        return PERFECT - score <= _least_missed(best.score)
 
     def _search(self, points: FloatArray, least: float, away: FloatArray) -> tuple[FloatArray, bool]:
         """(4,) of ``search_window``, and whether all was looked at."""
@@ -155,3 +170,8 @@ class ScanSearch:
             False,
         )
         return np.asarray(best), nodes <= BUDGET
+
+
+def _some_of(points: FloatArray) -> FloatArray:
+    """As many of points (K, 2), evenly, as a place is found by."""
+    return np.ascontiguousarray(points[:: max(1, math.ceil(len(points) / MOST_POINTS))])

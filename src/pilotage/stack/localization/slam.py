@@ -37,6 +37,8 @@ class SlamLocalizer:
         The map so far.
     """
 
+    on_map = False
+
     def __init__(
         self,
         config: SlamConfig,

@@ -10,6 +10,7 @@ from pilotage.core.types import STOP, FloatArray, Pose2, Twist
 from pilotage.kernels.control import disc_returns, eikonal, safe_stop, voronoi_window
 from pilotage.models.motion.motion import MotionConfig
 from pilotage.stack.navigator.patrol.gate import NO_GATE, gate_at
+from pilotage.stack.navigator.patrol.onward import Onward
 from pilotage.stack.navigator.patrol.passage import CLAIM_M
 from pilotage.stack.navigator.patrol.senses import NO_DISCS, NO_POINTS, Senses
 from pilotage.stack.navigator.patrol.still import StillWatch
@@ -74,16 +75,29 @@ class Motion:
         costs = window.heading_s_per_rad, window.near_cost_s, window.soft_m
         self._window = window.horizon_s, *costs, window.speeds, window.turns
         self._room: tuple[FloatArray, Pose2, tuple[float, float]] | None = None
-        self._still = StillWatch()
+        self._still, self._meets = StillWatch(), Onward(period_s + LATENCY_S, braking)
+        self._onward = NO_POINTS
+        self._swings_s = period_s + LATENCY_S + turn_rate / turning
         self.standing = NO_POINTS
         self.command, self.to_go_s = STOP, math.nan
         self.blocked = self.taken = False
 
     def watch(self) -> None:
-        """Look who stands, in a scan."""
+        """Look who stands, in a scan, and who comes as no mate would."""
+        self._onward = self._meets.step(self._senses)
         self.standing = self._still.step(
             self._senses.t_s, self._mute(self._beside()), self._senses.fell_silent()
         )
+
+    def _give_way_to_nobody(self) -> FloatArray:
+        """(P, 2) returns, base frame, of people and of who comes as they do."""
+        people, onward = self._senses.people, self._onward
+        return np.concatenate([people, onward]) if len(onward) else people
+
+    @property
+    def is_met(self) -> bool:
+        """Whether somebody comes on so near that a corner which swings now may hit him before it rests."""
+        return is_near(self._onward, self._senses.radius_m + PEOPLE_M_S * self._swings_s)
 
     def _beside(self) -> FloatArray:
         """(M, 2) returns of what may move and is near, base frame."""
@@ -175,7 +189,7 @@ class Motion:
             pose.as_array(),
             self._limits,
             self._safety,
-            (senses.near, senses.strange, senses.people),
+            (senses.near, senses.strange, self._give_way_to_nobody()),
             (time, x0, y0, spacing),
             gate,
             senses.field(lost=False),
@@ -260,6 +274,11 @@ class Motion:
         """Stop."""
         self.command = STOP
         return STOP
+
+
+def is_near(points_m: FloatArray, reach_m: float) -> bool:
+    """Whether one of points (K, 2) is nearer to the origin."""
+    return bool(len(points_m)) and bool(np.hypot(*points_m.T).min() < reach_m)
 
 
 def _discs(middles_xy_m: FloatArray, radius_m: float) -> FloatArray:

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
+import numpy as np
+
 from pilotage.core.errors import InputError
-from pilotage.core.types import Twist
+from pilotage.core.types import STOP, Twist
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.readings import Readings
 from pilotage.stack.control.last_word import LastWord
@@ -16,12 +20,14 @@ from pilotage.stack.navigator.patrol.config import PatrolNavigatorConfig
 from pilotage.stack.navigator.patrol.context import Context
 from pilotage.stack.navigator.patrol.paths import roadmap_for
 from pilotage.stack.navigator.patrol.precedence import Leading, precedence
+from pilotage.stack.navigator.patrol.senses import SIGMAS
 from pilotage.stack.navigator.patrol.states import transitions
 from pilotage.stack.navigator.patrol.states.charging import Charging
 from pilotage.stack.navigator.patrol.states.driving import Waiting
 from pilotage.stack.navigator.patrol.states.lost import Lost
 from pilotage.stack.navigator.patrol.states.state import State
 from pilotage.stack.navigator.wandering import Wandering
+from pilotage.stack.patrol.task import PatrolTask
 
 COLUMNS = {
     "mode": "1",
@@ -69,13 +75,16 @@ class PatrolNavigator:
                 f"{robot.motion.least_turning_radius_m:.2f} m; take robot.motion.name: differential-drive"
             )
         self._localizer = localizer_of(parts, "patrol")
-        self._tell_mates = Abilities.of(self._localizer).tell_mates
+        able = Abilities.of(self._localizer)
+        if not able.on_map:
+            _check_start(task.initial, parts.patrol)
+        self._tell_mates = able.tell_mates
         self._telemetry = journal.channel(COLUMNS, first=True)
         journal.counts |= {"gave_way": 0, "alarms": 0}
         if parts.patrol.supply is not None:
             journal.counts["charges"] = 0
         self._context = Context(config, robot, chart, parts.patrol, task.initial.pose, journal)
-        self._last_word = LastWord(robot)
+        self._last_word, self._has_corners = LastWord(robot), not robot.footprint.is_disc
         self._wandering = Wandering(config.wander, robot, self._localizer, self._last_word)
         self._state: State | None = None
 
@@ -102,7 +111,7 @@ class PatrolNavigator:
         lost = belief.status is BeliefStatus.LOST
         context.sense(readings, belief, lost=lost)
         state, astray = self._state, lost or context.is_off_roadmap()
-        if astray:
+        if astray or self._has_corners:
             self._last_word.take_in(readings)  # else each of its commands leaves it room to stop anyway
         if astray and not isinstance(state, Lost):
             what = "does not know where it is" if lost else "finds no path from where it is"
@@ -131,4 +140,23 @@ class PatrolNavigator:
             len(context.strange),
             *context.alarm,
         )
-        return command
+        return command if not self._has_corners or self._corners_allow(command) else STOP
+
+    def _corners_allow(self, command: Twist) -> bool:
+        """Whether no corner swings into anybody: who comes on is soon inside the disc that it drives as."""
+        swings = command.v_m_s == 0.0 and command.w_rad_s != 0.0
+        return not (swings and self._context.motion.is_met) and self._last_word.allows(command)
+
+
+def _check_start(start: Belief, task: PatrolTask) -> None:
+    """Refuse a start so vague that it passes by places; nothing that it senses mends that."""
+    x, y, cov = start.pose.x_m, start.pose.y_m, start.cov
+    away_m = float(np.hypot(*(task.graph.vertices_xy_m - (x, y)).T).max())
+    position_m, heading_rad = (SIGMAS * math.sqrt(cov.diagonal()[of].max()) for of in ([0, 1], [2]))
+    wrong_m = math.hypot(position_m, away_m * heading_rad)
+    if wrong_m > task.visit_m:
+        raise InputError(
+            "navigator 'patrol': expected a localizer that finds its place on the map, found one that keeps "
+            f"what it is wrong by at the start, up to {wrong_m:.1f} m at the farthest place to visit; take "
+            "stack.localizer: laser, or a stack.initial of smaller variances"
+        )
