@@ -7,7 +7,7 @@ import pytest
 
 from pilotage.core.chi_square import chi_square_quantile, gated_mean
 from pilotage.core.errors import InputError
-from pilotage.core.types import STOP
+from pilotage.core.types import STOP, Pose2
 from pilotage.experiments.build.build import build
 from pilotage.experiments.loop import run_loop, simulate
 from pilotage.experiments.mission import load_mission
@@ -143,20 +143,55 @@ class TestWatching:
         robot = told_of().robot
         watch = OdometryWatch(robot, WheelOdometryConfig(rate_hz=10.0))
         top = robot.motion.top_speed_m_s
-        place = 0.0
+        place, unsure = 0.0, Belief(Pose2(0.0, 0.0, 0.0), np.eye(3))
         for k in range(1, 31):
             said = OdometryIncrement(0.05, 0.0) if k <= 10 else None
-            more, _ = watch.variances(0.1 * k, said)
+            more, _ = watch.variances(0.1 * k, said, unsure)
             assert (more == 0.0) == (k <= 10)
             place += more
         assert place == pytest.approx((top * 2.0) ** 2)
+
+    @pytest.mark.parametrize(
+        ("sure_m", "status", "grows"),
+        [
+            (0.01, BeliefStatus.LOCALIZED, False),
+            (0.01, BeliefStatus.LOST, True),
+            (0.5, BeliefStatus.LOCALIZED, True),
+        ],
+    )
+    def test_silence_begins_anew_where_other_sensors_found_the_robot(
+        self, sure_m: float, status: BeliefStatus, grows: bool
+    ) -> None:
+        """Each silent step took the robot to be farther off than the last one, though it was found in all."""
+        robot = told_of().robot
+        watch = OdometryWatch(robot, WheelOdometryConfig(rate_hz=10.0))
+        belief = Belief(Pose2(0.0, 0.0, 0.0), np.diag([sure_m**2, sure_m**2, 1e-4]), status)
+        assert watch.variances(0.1, OdometryIncrement(0.05, 0.0), belief) == (0.0, 0.0)
+        more = [watch.variances(0.1 * k, None, belief) for k in range(2, 31)]
+        step = (0.1 * robot.motion.top_speed_m_s) ** 2
+        assert more[0][0] == pytest.approx(step)
+        assert more[-1][0] == pytest.approx(step * (29.0**2 - 28.0**2) if grows else step)
+        assert (more[-1][1] > 2.0 * more[0][1]) == grows
+
+    def test_a_wall_filter_goes_by_its_laser_alone(self) -> None:
+        """After a second without odometry it was lost, among walls that its scans fitted all the time."""
+        more = (
+            "robot.faults=[{name: gap, sensor: odometry, from_s: 10, length_s: 8}]",
+            "run.time_limit_s=20",
+        )
+        trace = run_loop(build(load_mission("museum-walls", more, 0))).finished.robots[0].trace
+        after = trace["t_s"] > 5.0
+        off = np.hypot(trace["est_x_m"] - trace["true_x_m"], trace["est_y_m"] - trace["true_y_m"])
+        assert trace["localized"][after].all()
+        assert off[after].max() < 0.1
 
     def test_an_increment_beyond_the_top_speed_is_as_uncertain_as_it_is_long(self) -> None:
         robot = told_of().robot
         watch = OdometryWatch(robot, WheelOdometryConfig(rate_hz=10.0))
         far = 3.0 * robot.motion.top_speed_m_s * 0.1
-        assert watch.variances(0.1, OdometryIncrement(0.05, 0.0)) == (0.0, 0.0)
-        assert watch.variances(0.2, OdometryIncrement(far, 0.0))[0] == pytest.approx(far**2)
+        unsure = Belief(Pose2(0.0, 0.0, 0.0), np.eye(3))
+        assert watch.variances(0.1, OdometryIncrement(0.05, 0.0), unsure) == (0.0, 0.0)
+        assert watch.variances(0.2, OdometryIncrement(far, 0.0), unsure)[0] == pytest.approx(far**2)
 
     def test_a_filter_is_believed_later_each_time_that_it_was_wrong(self) -> None:
         check, t_s, waits = SelfCheck(), 0.0, []

@@ -111,7 +111,7 @@ class DeadReckoningLocalizer:
             else:
                 self._prediction.move(self._pose, self._cov, odometry)
         before = self._cov.copy()
-        widened = self._watch.widen(self._cov, readings.t_s, odometry)
+        widened = self._watch.widen(self._cov, readings.t_s, odometry, self.belief)
         if widened and self._path is not None:
             self._path.widen(self._cov - before)
         if odometry is not None or widened:

@@ -159,7 +159,7 @@ class EkfGaussMarkovLocalizer:
         odometry = readings.by_sensor.get(self._odometry)
         if isinstance(odometry, OdometryIncrement):
             # What is missing is told below; here speaks what came and cannot be.
-            self._watch.widen(self._cov, readings.t_s, odometry)
+            self._watch.widen(self._cov, readings.t_s, odometry, self.belief)
         if isinstance(odometry, OdometryIncrement) and readings.t_s > last:
             moved = odometry.distance_m, odometry.angle_rad, odometry.lateral_m
             self._pending.append((last, readings.t_s, *moved))

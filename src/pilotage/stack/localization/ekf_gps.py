@@ -139,7 +139,7 @@ class EkfGpsLocalizer:
         odometry = self._motion.increment(readings, self.belief)
         if odometry is not None:
             self._prediction.move(self._state, self._cov, odometry)
-        self._watch.widen(self._cov, readings.t_s, odometry)
+        self._watch.widen(self._cov, readings.t_s, odometry, self.belief)
         since_s = 0.0 if self._last_s is None else max(readings.t_s - self._last_s, 0.0)
         driven_m = 0.0 if odometry is None else math.hypot(odometry.distance_m, odometry.lateral_m)
         self._last_s = readings.t_s

@@ -149,7 +149,7 @@ class EkfWallsLocalizer:
         odometry = self._motion.increment(readings, self.belief)
         if odometry is not None:
             self._move(odometry)
-        if self._watch.widen(self._cov, readings.t_s, odometry):
+        if self._watch.widen(self._cov, readings.t_s, odometry, self.belief):
             self._alike = 0
         seen, used, nis = 0, 0, 0.0
         scan = readings.by_sensor.get(self._lidar)

@@ -117,7 +117,7 @@ class InvariantEkfLocalizer:
                 distance_var,
                 angle_var,
             )
-        place, heading = self._watch.variances(readings.t_s, odometry)
+        place, heading = self._watch.variances(readings.t_s, odometry, self.belief)
         if place > 0.0 or heading > 0.0:
             # The map frame's error is told at the pose's own place, where these add up as in x, y and theta.
             rover_filter.leave_anchor(self._state, self._cov, self._anchor, self._points)

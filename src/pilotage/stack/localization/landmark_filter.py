@@ -155,7 +155,7 @@ class LandmarkFilter:
         odometry = self._motion.increment(readings, self.belief)
         if odometry is not None:
             self._prediction.move(self._pose, self._cov, odometry)
-        self._watch.widen(self._cov, readings.t_s, odometry)
+        self._watch.widen(self._cov, readings.t_s, odometry, self.belief)
         seen = readings.by_sensor.get(self._beacons)
         if isinstance(seen, BeaconReadings):
             self._update(seen)

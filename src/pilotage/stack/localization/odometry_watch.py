@@ -7,6 +7,7 @@ import math
 from pilotage.core.types import FloatArray
 from pilotage.sensors.readings import OdometryIncrement
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
+from pilotage.stack.interface import Belief, BeliefStatus
 from pilotage.stack.knowledge import RobotKnowledge
 
 TURN_SHARE = 0.5
@@ -25,8 +26,10 @@ class OdometryWatch:
     """Widens a belief by what the robot could have driven while its odometry was silent.
 
     It may have stood, or gone on at its top speed, which stays what it is: the place then has the variance
-    (speed t)^2 after a time t, whatever the direction. An increment that the motion cannot have made is as
-    uncertain as it is long. Readings that come in time and can be change nothing.
+    (speed t)^2 after a time t, whatever the direction. The time begins anew whenever other sensors have found
+    the robot as well as one silent step alone could hide it: what it drove until then is known. An increment
+    that the motion cannot have made is as uncertain as it is long. Readings that come in time and can be
+    change nothing.
     """
 
     def __init__(self, robot: RobotKnowledge, sensor: WheelOdometryConfig) -> None:
@@ -35,21 +38,32 @@ class OdometryWatch:
         self._turn_rad_s = TURN_SHARE * robot.motion.top_turn_rate_rad_s
         self._dt_s = robot.dt_s
         self._last_s: float | None = None  # from the first step on: when the last reading came
-        self._widened_s = 0.0
+        self._from_s = self._widened_s = self._now_s = 0.0
 
-    def variances(self, t_s: float, odometry: OdometryIncrement | None) -> tuple[float, float]:
-        """What a step adds to the variances of each coordinate (m^2) and of the heading (rad^2)."""
+    def variances(
+        self, t_s: float, odometry: OdometryIncrement | None, belief: Belief
+    ) -> tuple[float, float]:
+        """What a step adds to the variances of each coordinate (m^2) and of the heading (rad^2).
+
+        Parameters
+        ----------
+        belief
+            After the last step.
+        """
         if self._last_s is None:
-            self._last_s = t_s - self._dt_s
-        since_s = t_s - self._last_s
+            self._last_s = self._from_s = self._now_s = t_s - self._dt_s
+        before_s, self._now_s = self._now_s, t_s
         if odometry is None:
-            if since_s < self._period_s - 0.5 * self._dt_s:
+            if t_s - self._last_s < self._period_s - 0.5 * self._dt_s:
                 return 0.0, 0.0
+            if self._widened_s > 0.0 and self._is_sure(belief):
+                self._from_s, self._widened_s = before_s, 0.0
+            since_s = t_s - self._from_s
             square = since_s**2 - self._widened_s**2
             self._widened_s = since_s
             return self._top_m_s**2 * square, self._turn_rad_s**2 * square
-        since_s = max(since_s, self._period_s)
-        self._last_s, self._widened_s = t_s, 0.0
+        since_s = max(t_s - self._last_s, self._period_s)
+        self._last_s, self._from_s, self._widened_s = t_s, t_s, 0.0
         far = math.hypot(odometry.distance_m, odometry.lateral_m) > TOO_FAST * self._top_m_s * since_s
         spun = abs(odometry.angle_rad) > TOO_FAST * self._turn_rad_s / TURN_SHARE * since_s
         if not (far or spun):
@@ -58,10 +72,19 @@ class OdometryWatch:
         place = odometry.distance_m**2 + odometry.lateral_m**2
         return max(place, (self._top_m_s * since_s) ** 2), odometry.angle_rad**2
 
-    def widen(self, cov: FloatArray, t_s: float, odometry: OdometryIncrement | None) -> bool:
+    def _is_sure(self, belief: Belief) -> bool:
+        """Whether a belief is as sure as one silent step would leave it, or surer."""
+        (xx, _, _), (_, yy, _), (_, _, heading) = belief.cov.tolist()
+        return (
+            belief.status is BeliefStatus.LOCALIZED
+            and max(xx, yy) <= (self._top_m_s * self._dt_s) ** 2
+            and heading <= (self._turn_rad_s * self._dt_s) ** 2
+        )
+
+    def widen(self, cov: FloatArray, t_s: float, odometry: OdometryIncrement | None, belief: Belief) -> bool:
         """Add a step's variances to the covariance of a pose, which comes first in ``cov`` (N, N); returns
         whether there were any."""
-        place, heading = self.variances(t_s, odometry)
+        place, heading = self.variances(t_s, odometry, belief)
         if place == 0.0 and heading == 0.0:
             return False
         add_variances(cov, place, heading)

@@ -191,7 +191,7 @@ class ParticleFilterLocalizer:
         odometry, t_s = self._motion.increment(readings, self.belief), readings.t_s
         if odometry is not None:
             self._move(odometry)
-        self._spread(*self._watch.variances(t_s, odometry))
+        self._spread(*self._watch.variances(t_s, odometry, self.belief))
         scan = readings.by_sensor.get(self._lidar)
         moments, seen = None, np.zeros((0, 2))
         if isinstance(scan, LidarScan):
