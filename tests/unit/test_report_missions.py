@@ -149,7 +149,7 @@ def test_a_team_is_shown_whole(two: Path) -> None:
     page = checked_page(two, "replay", "robots", "map", "events", "metrics", "robots-over-time")
     for k, name in enumerate(("anna", "bert")):
         assert f'id="map-show-robot-{k}"' in page
-        assert f"</span> {name}</span></th>" in page
+        assert f"</span>\u00a0{name}</th>" in page
     assert "0 of 2 robots succeeded" in page
     assert "anna: " in page
     assert "Of the whole team: metres driven" in page

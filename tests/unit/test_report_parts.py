@@ -21,6 +21,7 @@ from scipy.stats import chi2
 
 from pilotage.core.types import FloatArray
 from pilotage.missions.team import LARGEST_TEAM
+from pilotage.records.people import PeopleTracks
 from pilotage.records.run_data import read_run
 from pilotage.report import quantities, style, summary_table
 from pilotage.report.calibration.plots import MOST_BINS, histogram, panels_in_a_row
@@ -34,9 +35,10 @@ from pilotage.report.figures.map_view import view_limits
 from pilotage.report.figures.placing import LabelPlacer, along
 from pilotage.report.headline import headline
 from pilotage.report.light_axes import LightAxes
-from pilotage.report.markup import Html, escape, table
+from pilotage.report.markup import Html, escape, page, table
 from pilotage.report.series import band, decimate, merge_spans, running_mean, spans
-from pilotage.report.team import colour_of
+from pilotage.report.team import colour_of, team_section
+from support.browser import Browser
 from support.fabricated_run import fabricate_metrics, fabricate_run, fabricate_world
 from support.pages import page_of
 
@@ -311,3 +313,25 @@ def test_pillars_alone_are_walls_in_the_legend(tmp_path: Path) -> None:
     run = read_run(fabricate_run(tmp_path / "run"))
     pillars = replace(run.world, segments_m=np.zeros((0, 4)), circles_m=np.array([[1.0, 1.0, 0.2]]))
     assert "walls" in {key.label for key in map_figure(replace(run, world=pillars)).keys}
+
+
+def test_close_ups_show_who_was_there(tmp_path: Path) -> None:
+    run = read_run(fabricate_run(tmp_path / "run"))
+    x, y = run.trace["true_x_m"], run.trace["true_y_m"]
+    beside = np.stack([np.column_stack([x + 0.6, y]), np.column_stack([x + 500.0, y])], axis=1)
+    seen = close_ups_figure(replace(run, people=PeopleTracks(run.trace.t_s, beside, np.array([0.25, 0.25]))))
+    assert "people at that moment" in {key.label for key in seen.keys}
+    assert seen.svg.count('class="layer-people"') == 3, "one in each window, and nobody half a kilometre away"
+
+
+def test_a_robots_long_reason_leaves_its_numbers_in_sight(browser: Browser, tmp_path: Path) -> None:
+    reason = "stuck: gave up after 30 replans, the last because the laser shows no room for the command"
+    entry = {"success": False, "reason": reason, "path_length_m": 10.0, "position_rmse_m": 0.01}
+    each = {"a long name of the first of them": entry, "b": entry}
+    shown = page([team_section({"robots": each})], title="", eyebrow="", footer="")
+    file = tmp_path / "page.html"
+    file.write_text(shown, encoding="utf-8")
+    browser.size(900, 800)
+    browser.open(file, "document.querySelector('#robots table')")
+    box = "document.querySelector('#robots table').parentElement"
+    assert browser.js(f"{box}.scrollWidth <= {box}.clientWidth")

@@ -5,9 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from PIL import Image
 
 from pilotage.experiments.mission import load_mission
@@ -16,8 +19,9 @@ from pilotage.records.run_data import read_run
 from pilotage.records.terrain import TerrainPictures, read_terrain
 from pilotage.records.trace import Trace
 from pilotage.report import write_report
+from pilotage.report.figures import terrain_curve
 from pilotage.report.figures.terrain_estimate import rover_error_figure
-from pilotage.report.figures.terrain_map import close_up_figure
+from pilotage.report.figures.terrain_map import close_up_figure, ground_axes
 from pilotage.report.replay.section import LONG_SPEEDS, replay_section
 from pilotage.report.replay.terrain import GREYS, SHARES, ground_raster, terrain_scene
 from support.browser import Browser
@@ -100,6 +104,26 @@ def test_only_a_plan_is_shown_along_it(tmp_path: Path) -> None:
     np.testing.assert_allclose(rover.theta_rad[:-1], heading)
     assert not scene.sights
     assert "Nothing was driven" in scene.note
+
+
+def test_the_curve_is_shown_on_the_map_and_not_beside_it(
+    estimated: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shown: list[Axes] = []
+
+    def seen(*arguments: Any) -> tuple[Figure, Axes]:
+        figure, axes = ground_axes(*arguments)
+        shown.append(axes)
+        return figure, axes
+
+    monkeypatch.setattr(terrain_curve, "ground_axes", seen)
+    assert terrain_curve.curve_figure(read_run(estimated)).svg
+    (axes,) = shown
+    (x0, x1), (y0, y1) = axes.get_xlim(), axes.get_ylim()
+    assert x0 >= 0.0
+    assert x1 <= 600.0
+    assert y0 >= -10.0, "the origin of such images"
+    assert y1 <= 390.0
 
 
 def test_no_way_no_replay(tmp_path: Path) -> None:

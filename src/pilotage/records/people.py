@@ -30,6 +30,13 @@ class PeopleTracks:
     places_m: FloatArray = field(default_factory=lambda: np.empty((0, 0, 2)))
     radius_m: FloatArray = field(default_factory=lambda: np.empty(0))
 
+    def at(self, t_s: FloatArray) -> FloatArray:
+        """(M, P, 2) places at (M,) times: those at the last time before each that was kept."""
+        if not len(self.t_s):
+            return np.empty((len(t_s), 0, 2))
+        last = np.searchsorted(self.t_s, t_s + 1e-6, side="right") - 1
+        return self.places_m[np.maximum(last, 0)]
+
 
 def write_people(folder: Path, people: PeopleTracks) -> None:
     """Write the tracks; no file where there are none."""

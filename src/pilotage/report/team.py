@@ -92,7 +92,7 @@ def team_section(metrics: Mapping[str, Any]) -> Section:
     ]
     columns = [("robot", ROW), ("outcome", ""), *((METRICS.find(key).name, VALUE) for key in keys)]
     rows = [_row(k, name, entry, keys) for k, (name, entry) in enumerate(list(each.items())[:MOST_ROWS])]
-    return section(SLUG, TITLE, table(columns, rows, "events", box="long"))
+    return section(SLUG, TITLE, table(columns, rows, "events robots", box="long"))
 
 
 def _row(robot: int, name: str, entry: Mapping[str, Any], keys: Sequence[str]) -> list[str]:
@@ -100,5 +100,5 @@ def _row(robot: int, name: str, entry: Mapping[str, Any], keys: Sequence[str]) -
     outcome = "✓ success" if entry.get("success") is True else f"✗ {reason}"
     values = (quantities.measured(number(entry.get(key)), METRICS.find(key).unit) for key in keys)
     badge = f'<span class="badge" style="border-color:{colour_of(robot)}">{robot + 1}</span>'
-    named = Html(f'<span style="white-space:nowrap">{badge} {escape(name)}</span>')
+    named = Html(f"{badge}\u00a0{escape(name)}")
     return [named, outcome, *values]

@@ -82,6 +82,7 @@ def close_ups_figure(run: RunData) -> Illustration:
         axes.set_title(moment.title, fontsize=9.0)
         axes.locator_params(nbins=5)
         _draw(axes, _window(run, x, y, half_m, moment.step), run, moment.step, radius)
+        layers.draw_people(axes, run, float(run.trace.t_s[moment.step]), half_m, x, y)
     sides = [quantities.length(2.0 * max(least_m, 1.3 * moment.error_m)) for moment in moments]
     caption = (
         f"{'Windows' if len(sides) > 1 else 'A window'} of {' and '.join(dict.fromkeys(sides))}, in metres "
@@ -96,6 +97,7 @@ def close_ups_figure(run: RunData) -> Illustration:
         (bool(run.plans), Key("first plan", SKY, "band")),
         (len(run.plans) > 1, Key("replans", PURPLE, "band")),
         (run.world.has_obstacles, Key("unexpected obstacle", ORANGE, "band", opacity=1.0)),
+        (len(run.people.t_s) > 0, Key("people at that moment", layers.PEOPLE_COLOUR, "spot")),
         (len(run.mapped_points_m) > 0, Key("mapped by the robot", BLACK, "spot")),
     )
     keys = tuple(key for there, key in candidates if there)

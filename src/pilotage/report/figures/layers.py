@@ -35,6 +35,7 @@ TREE_COLOUR = "#b4bec9"
 OBSTACLE_EDGE = "#7a5400"
 # A tree of more edges is a grey cloud; its first edges show its shape just as well.
 MOST_TREE_EDGES = 5000
+PEOPLE_COLOUR = GREEN
 _CIRCLE = np.stack([np.cos(np.linspace(0, 2 * np.pi, 33)), np.sin(np.linspace(0, 2 * np.pi, 33))])
 
 
@@ -63,6 +64,14 @@ def draw_obstacles(axes: Axes, world: World) -> None:
     one_shape(axes, polygons, gid="layer-obstacles", **look)
     circles(axes, world.obstacle_circles_m, "obstacles", **look)
     segments(axes, world.obstacle_segments_m, "obstacles", color=OBSTACLE_EDGE, linewidth=1.2, zorder=5.1)
+
+
+def draw_people(axes: Axes, run: RunData, t_s: float, half_m: float, x: float, y: float) -> None:
+    """Draw whoever was in a square about a place at a time."""
+    places = run.people.at(np.array([t_s]))[0]
+    discs = np.column_stack([places, run.people.radius_m])
+    there = np.abs(places - (x, y)).max(axis=1, initial=0.0) < half_m
+    circles(axes, discs[there], "people", facecolor=PEOPLE_COLOUR, edgecolor=INK, linewidth=0.8, zorder=8.8)
 
 
 def draw_tree(axes: Axes, run: RunData) -> None:

@@ -9,7 +9,7 @@ from pilotage.core.types import FloatArray
 from pilotage.records.run_data import RunData
 from pilotage.report import quantities
 from pilotage.report.figures.terrain_estimate import thinned
-from pilotage.report.figures.terrain_map import ground_axes, show_ground, tinted, unit_of
+from pilotage.report.figures.terrain_map import corners, ground_axes, show_ground, tinted, unit_of
 from pilotage.report.style import GREEN, ORANGE, YELLOW, Illustration, Key, render
 
 WINDOW_M = 600.0
@@ -32,7 +32,12 @@ def curve_figure(run: RunData) -> Illustration:
     worst = curve[int(apart.argmax())]
     unit = unit_of(pictures)
     half = 0.5 * WINDOW_M
-    figure, axes = ground_axes(pictures, (worst - half) / unit, (worst + half) / unit)
+    rim = corners(pictures)
+    figure, axes = ground_axes(
+        pictures,
+        np.maximum((worst - half) / unit, rim.min(axis=0)),
+        np.minimum((worst + half) / unit, rim.max(axis=0)),
+    )
     ground = pictures.hazards if pictures.ground is None else pictures.ground
     show_ground(axes, pictures, tinted(ground, pictures.hazards, ORANGE, 0.45))
     near = np.abs(route - worst).max(axis=1) < WINDOW_M

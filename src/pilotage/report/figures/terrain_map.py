@@ -128,9 +128,9 @@ def ground_axes(
     pictures: TerrainPictures, low: FloatArray | None = None, high: FloatArray | None = None
 ) -> tuple[Figure, Axes]:
     """Axes to scale around a part of the map or all of it, in kilometres where it is large."""
-    corners = _corners(pictures)
     if low is None or high is None:
-        low, high = corners.min(axis=0), corners.max(axis=0)
+        rim = corners(pictures)
+        low, high = rim.min(axis=0), rim.max(axis=0)
     width = WIDTH_PT - _LEFT_PT - _RIGHT_PT
     height = min(_MOST_HEIGHT_PT, width * (high[1] - low[1]) / (high[0] - low[0]))
     total = height + _TOP_PT + _BOTTOM_PT
@@ -151,7 +151,8 @@ def unit_of(pictures: TerrainPictures) -> float:
     return 1000.0 if pictures.size_m.max() >= 5000.0 else 1.0
 
 
-def _corners(pictures: TerrainPictures) -> FloatArray:
+def corners(pictures: TerrainPictures) -> FloatArray:
+    """(4, 2) corners of the map in the axes' unit."""
     width, height = pictures.size_m
     own = np.array([[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]])
     return np.asarray(_to_map(pictures).transform(own))

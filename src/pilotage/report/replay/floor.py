@@ -9,7 +9,7 @@ import numpy as np
 from pilotage.core.types import FloatArray, IntArray, Pose2
 from pilotage.records.run_data import RunData
 from pilotage.report.figures.grid import OCCUPIED_COLOUR, UNKNOWN_COLOUR, cell_classes, known_corners
-from pilotage.report.figures.layers import body_outline
+from pilotage.report.figures.layers import PEOPLE_COLOUR, body_outline
 from pilotage.report.modes import MODES
 from pilotage.report.replay.common import Column, position_error, scene_events
 from pilotage.report.replay.scene import (
@@ -34,7 +34,6 @@ MOST_FRAMES = 20_000
 MOST_SCAN_VALUES = 400_000
 MOST_PATH_POINTS = 1500
 DEFAULT_RADIUS_M = 0.2
-PEOPLE_COLOUR = GREEN
 GRID_PALETTE = ("transparent", UNKNOWN_COLOUR, OCCUPIED_COLOUR)
 
 
@@ -124,13 +123,11 @@ def _poses(run: RunData, column: Column) -> tuple[PoseTrack, ...]:
 
 
 def _people(run: RunData, frames_s: FloatArray) -> tuple[DiscTrack, ...]:
-    """Everybody at the frames: at the last time before each that was kept."""
+    """Everybody at the frames."""
     people = run.people
     if not len(people.t_s):
         return ()
-    at = np.searchsorted(people.t_s, frames_s + 1e-6, side="right") - 1
-    places = people.places_m[np.maximum(at, 0)]
-    return (DiscTrack("people", places, people.radius_m, PEOPLE_COLOUR),)
+    return (DiscTrack("people", people.at(frames_s), people.radius_m, PEOPLE_COLOUR),)
 
 
 def _lines(run: RunData) -> tuple[Lines, ...]:

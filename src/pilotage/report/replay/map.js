@@ -364,7 +364,7 @@ class ReplayMap {
         else if (layer.look === "cross") { pen.moveTo(x - 5, y - 5); pen.lineTo(x + 5, y + 5); pen.moveTo(x + 5, y - 5); pen.lineTo(x - 5, y + 5); }
         else { pen.moveTo(x, y - 5); pen.lineTo(x + 5, y); pen.lineTo(x, y + 5); pen.lineTo(x - 5, y); pen.fill(); }
         if (layer.look === "ring" || layer.look === "cross") pen.stroke();
-        const width = 2 + 7 * label.length;
+        const width = 2 + pen.measureText(label).width;
         const spots = [[x + 8, y - 7], [x + 8, y + 7], [x - 8 - width, y - 7], [x - 8 - width, y + 7]];
         for (const [left, middle] of spots) {
           const box = [left, middle - 6, left + width, middle + 6];
