@@ -96,6 +96,18 @@ def test_what_a_calibration_writes_is_drawn(
     assert told(tmp_path, WHOLE[kind](), arrays_of(kind), capsys) == (0, "")
 
 
+def test_a_page_of_one_log_says_so_and_tells_tiny_chances_as_all_numbers(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    answer = odometry()
+    answer["logs"][0]["distance_error"]["normality_p"] = 3.3e-7
+    assert told(tmp_path, answer, arrays_of("odometry"), capsys) == (0, "")
+    (file,) = tmp_path.rglob("report.html")
+    page = file.read_text("utf-8")
+    assert "1 log; offset: none." in page
+    assert "p = 3.3 × 10⁻⁷" in page
+
+
 ANSWERS = [
     ("odometry", "logs.0.distance_error", 1.5, "logs.0.distance_error: expected a mapping with keys of"),
     (

@@ -332,6 +332,6 @@ def test_a_robots_long_reason_leaves_its_numbers_in_sight(browser: Browser, tmp_
     file = tmp_path / "page.html"
     file.write_text(shown, encoding="utf-8")
     browser.size(900, 800)
-    browser.open(file, "document.querySelector('.robots')")
-    box = "document.querySelector('.robots').parentElement"
+    browser.open(file, "document.querySelector('#robots table')")
+    box = "document.querySelector('#robots table').parentElement"
     assert browser.js(f"{box}.scrollWidth <= {box}.clientWidth")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from pilotage.core.errors import InputError
 from pilotage.records.slam_folder import SlamFolder, read_slam_folder
 from pilotage.report import write_report
 from pilotage.report.figures.grid import UNKNOWN_CELL, cell_classes
+from pilotage.report.slam.page import slam_page
 from pilotage.report.slam.replay import MOST_CELLS, slam_scene
 from support.browser import Browser, find_browser
 from support.laser_rooms import along, furnished, recording, write_carmen
@@ -102,3 +104,15 @@ def test_a_damaged_folder_is_one_line(folder: Path, tmp_path: Path, name: str, c
     with pytest.raises(InputError, match=name) as told:
         write_report(damaged)
     assert "\n" not in str(told.value)
+
+
+def test_a_path_without_a_loop_has_no_closures_on_its_page(data: SlamFolder) -> None:
+    none = {"closures_accepted": 0, "closures_searched": 0}
+    page = slam_page(replace(data, closures=[], metrics={**data.metrics, **none}))
+    assert "a path without a loop" in page
+    assert "near enough to be compared" in page
+    for word in ("Closures, all", "green lines", "Green ticks", "a loop was closed"):
+        assert word not in page, word
+    assert page.count("closed loops") == page.count("<dt>closed loops</dt>") + page.count(
+        "and the closed loops"
+    )

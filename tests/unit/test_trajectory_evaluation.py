@@ -15,7 +15,14 @@ from pilotage.cli.main import main
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
 from pilotage.evaluation.trajectory import associate, trajectory_errors, umeyama
-from pilotage.logs.trajectories import Trajectory3, read_kitti, read_tum
+from pilotage.logs.trajectories import (
+    Trajectory3,
+    TrajectoryFormat,
+    guess_format,
+    read_kitti,
+    read_trajectory,
+    read_tum,
+)
 
 
 def wander(n: int = 60, seed: int = 0, t_s: FloatArray | None = None) -> Trajectory3:
@@ -98,6 +105,14 @@ def test_bad_tum_files_are_named_with_their_line(tmp_path: Path, text: str, mess
     path.write_text(text)
     with pytest.raises(InputError, match=message):
         read_tum(path)
+
+
+def test_a_runs_folder_is_told_where_its_trajectory_is(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"found a folder; .*pilotage export RUN --to tum"):
+        guess_format(tmp_path)
+    (tmp_path / "trajectory.tum").write_text("")
+    with pytest.raises(InputError, match=r"found a folder; it holds trajectory\.tum"):
+        read_trajectory(tmp_path, TrajectoryFormat.KITTI)
 
 
 def test_kitti_rows_are_pose_matrices(tmp_path: Path) -> None:

@@ -66,6 +66,7 @@ def guess_format(path: Path) -> TrajectoryFormat:
     InputError
         File and line where they are of neither.
     """
+    _is_no_folder(path)
     lines = read_lines(path)
     for number, line in enumerate(lines, start=1):
         columns = len(line.partition("#")[0].split())
@@ -81,7 +82,19 @@ def guess_format(path: Path) -> TrajectoryFormat:
 
 def read_trajectory(path: Path, form: TrajectoryFormat) -> Trajectory3:
     """Read a trajectory; InputError with file and line where it cannot be used."""
+    _is_no_folder(path)
     return read_tum(path) if form is TrajectoryFormat.TUM else read_kitti(path)
+
+
+def _is_no_folder(path: Path) -> None:
+    if path.is_dir():
+        there = "trajectory.tum" if (path / "trajectory.tum").is_file() else ""
+        hint = (
+            f"it holds {there}"
+            if there
+            else "of a run 'pilotage export RUN --to tum' writes its trajectories"
+        )
+        raise InputError(f"{path}: expected a trajectory's file, found a folder; {hint}")
 
 
 def read_tum(path: Path) -> Trajectory3:

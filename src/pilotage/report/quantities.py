@@ -87,6 +87,11 @@ def count(value: float) -> str:
     return f"{round(value):,}".replace(",", "\u00a0") if math.isfinite(value) else NOTHING
 
 
+def counted(number: int, noun: str) -> str:
+    """So many of something: ``1 course``, ``2 courses``."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
 def _degrees(value: float) -> str:
     return f"{significant(value)}°" if math.isfinite(value) else NOTHING
 

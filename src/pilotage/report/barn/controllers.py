@@ -13,7 +13,6 @@ from pilotage.core.whole_file import write_whole
 from pilotage.evaluation.courses import CourseRun, CourseSummary, summarize_courses
 from pilotage.report.barn.figure import COLOURS, HEIGHT_PT, MARKS
 from pilotage.report.barn.pairs import (
-    counted,
     interval,
     number,
     outcome,
@@ -24,6 +23,7 @@ from pilotage.report.barn.pairs import (
     seconds,
 )
 from pilotage.report.markup import REPORT_FILE, Section, figure_sections, page, section
+from pilotage.report.quantities import counted
 from pilotage.report.style import WIDTH_PT, Illustration, Key, drawing_style, render
 
 HEAD = (

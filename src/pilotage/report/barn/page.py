@@ -12,7 +12,6 @@ from pilotage.evaluation.barn import BarnRun, summarize
 from pilotage.evaluation.intervals import wilson
 from pilotage.report.barn.figure import difficulty_figure
 from pilotage.report.barn.pairs import (
-    counted,
     interval,
     number,
     outcome,
@@ -23,6 +22,7 @@ from pilotage.report.barn.pairs import (
     seconds,
 )
 from pilotage.report.markup import REPORT_FILE, Section, figure_sections, page, section
+from pilotage.report.quantities import counted
 from pilotage.report.style import drawing_style
 
 WORST = 6

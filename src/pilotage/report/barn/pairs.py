@@ -90,11 +90,6 @@ def percent(share: float) -> str:
     return f"{100.0 * share:.1f}\u00a0%"
 
 
-def counted(count: int, noun: str) -> str:
-    """So many of something: ``1 course``, ``2 courses``."""
-    return f"{count} {noun}{'' if count == 1 else 's'}"
-
-
 def number(value: float, digits: int) -> str:
     """So many digits after the point; a dash for none."""
     return f"{value:.{digits}f}" if math.isfinite(value) else "–"

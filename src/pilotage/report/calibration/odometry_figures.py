@@ -76,7 +76,7 @@ def _caption(log: Mapping[str, Any], told: Mapping[str, Any], quantity: str, uni
         verdict = (
             "normal as far as these steps can tell" if p >= 0.05 else "not what a normal would look like"
         )
-        parts.append(f"{told['normality_test']}: p = {p:.2g}, {verdict}.")
+        parts.append(f"{told['normality_test']}: p = {scientific(p, 2)}, {verdict}.")
     if log.get("wrong_axis"):
         parts.append(
             "The odometry took each step along a wrong axis; the error is shown along that axis, "

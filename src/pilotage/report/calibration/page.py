@@ -26,7 +26,7 @@ from pilotage.report.markup import (
     section,
     table,
 )
-from pilotage.report.quantities import scientific
+from pilotage.report.quantities import counted, scientific
 from pilotage.report.style import drawing_style
 
 _FIGURES = {
@@ -209,11 +209,12 @@ def _headline(answer: Mapping[str, Any]) -> str:
         logs = answer["logs"]
         used = sum(bool(log["used"]) for log in logs)
         shape = (answer.get("offset") or {}).get("shape", "none")
-        return f"{len(logs)} logs, {used} of them used; offset: {shape}."
+        left_out = f", {used} of them used" if used < len(logs) else ""
+        return f"{counted(len(logs), 'log')}{left_out}; offset: {shape}."
     if kind == "commands":
-        return (
-            f"{len(answer['logs'])} recordings, {answer['windows']} windows, {answer['readings']} readings."
-        )
+        numbers = ((len(answer["logs"]), "recording"), (answer["windows"], "window"))
+        told = [counted(count, noun) for count, noun in (*numbers, (answer["readings"], "reading"))]
+        return f"{', '.join(told)}."
     if kind == "range":
         count = len(answer["sensors"])
         what = "1 quantity" if count == 1 else f"{count} quantities"

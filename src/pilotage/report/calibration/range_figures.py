@@ -71,5 +71,5 @@ def _caption(entry: Mapping[str, Any], unit: str) -> str:
             f"The sensor was given {scientific(entry[f'given_var_{unit}2'])} {unit}²: {verdict} the interval."
         )
     if entry.get("normality_p") is not None:
-        parts.append(f"{entry['normality_test']}: p = {entry['normality_p']:.2g}.")
+        parts.append(f"{entry['normality_test']}: p = {scientific(entry['normality_p'], 2)}.")
     return " ".join(parts)

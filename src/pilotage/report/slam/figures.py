@@ -63,11 +63,16 @@ def map_figure(data: SlamFolder) -> Illustration:
     count = data.metrics["closures_accepted"]
     caption = (
         f"White is free, dark is wall, grey was never seen; cells of {grid.resolution_m:g} m. The path is "
-        "that of the scanner after the last optimization; each of the "
-        f"{count} green lines joins the middles of two stretches of the path that were found to see the same "
-        "walls."
+        "that of the scanner after the last optimization"
+        + (
+            f"; each of the {count} green lines joins the middles of two stretches of the path that were "
+            "found to see the same walls."
+            if count
+            else "."
+        )
     )
-    keys = (Key("path", BLUE, "line", "path"), Key("closed loops", GREEN, "line", "loops"))
+    loops = (Key("closed loops", GREEN, "line", "loops"),) if count else ()
+    keys = (Key("path", BLUE, "line", "path"), *loops)
     return Illustration("map", "The map", alt, caption, render(figure, "map", alt), keys)
 
 
@@ -128,16 +133,18 @@ def uncertainty_figure(data: SlamFolder) -> Illustration:
     angle = np.degrees(np.sqrt(data.covariances[:, 2, 2]))
     series(position, t_s, largest, BLUE)
     series(heading, t_s, angle, BLUE)
+    ticks = [c.later_t_s - data.t_s[0] for c in data.closures if c.accepted]
     for axes, values in ((position, largest), (heading, angle)):
         axes.set_ylim(0.0, nice_limit(float(values.max())))
-        ticks = [c.later_t_s - data.t_s[0] for c in data.closures if c.accepted]
         axes.plot(ticks, np.zeros(len(ticks)), "|", color=GREEN, markersize=7.0, clip_on=False)
     time_limits([position, heading], t_s)
     caption = (
         "How unsure the path is, seen from its first scan: the larger axis of the position's ellipse, and "
-        "the heading. Green ticks are the later ends of closed loops, where the graph learns most."
+        "the heading."
+        + (" Green ticks are the later ends of closed loops, where the graph learns most." if ticks else "")
     )
-    keys = (Key("standard deviation", BLUE), Key("a loop was closed", GREEN, "spot"))
+    loops = (Key("a loop was closed", GREEN, "spot"),) if ticks else ()
+    keys = (Key("standard deviation", BLUE), *loops)
     alt = "Standard deviations along the path"
     return Illustration(
         "uncertainty", "Uncertainty along the path", alt, caption, render(figure, "uncertainty", alt), keys

@@ -79,13 +79,17 @@ def slam_page(data: SlamFolder) -> str:
         ]
     m = data.metrics
     sections = figure_sections(figures)
-    sections.insert(4, closures_section(data))
+    if data.closures:
+        sections.insert(4, closures_section(data))
     sections.insert(1, replay_section(slam_scene(data)))
     sections += [_numbers(m), _warnings(m)]
+    loops = (
+        f"{quantities.count(m['closures_accepted'])} of {quantities.count(m['closures_searched'])} compared "
+        "pairs of stretches closed a loop"
+    )
     headline = (
         f"{quantities.count(m['scans'])} scans over {m['path_length_m']:.0f}\u00a0m in "
-        f"{quantities.duration(m['duration_s'])}; {quantities.count(m['closures_accepted'])} of "
-        f"{quantities.count(m['closures_searched'])} compared pairs of stretches closed a loop."
+        f"{quantities.duration(m['duration_s'])}; {loops if data.closures else 'a path without a loop'}."
     )
     if "extends" in m:
         headline += f" Joined to {Path(m['extends']).name} by {m['closures_joining']} of them."
