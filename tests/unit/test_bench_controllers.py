@@ -7,18 +7,21 @@ import json
 import math
 import sqlite3
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
 from pilotage.cli.main import main
 from pilotage.evaluation.courses import CourseRun, summarize_courses
+from pilotage.experiments import barn_benchmark, controller_benchmark
 from pilotage.experiments.controller_benchmark import CourseRequest, drive_course
 from pilotage.experiments.course_driving import course_base
 from pilotage.experiments.course_families import Course, Driver, make_course_of
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.models.footprint import Footprint
 from pilotage.models.motion.differential_drive import DifferentialDriveConfig
+from support.fuzz_targets import BY_NAME
 
 JACKAL = np.array([[0.254, 0.215], [-0.254, 0.215], [-0.254, -0.215], [0.254, -0.215]])
 DRIVER = Driver(Footprint.polygon(JACKAL), JACKAL, DifferentialDriveConfig(max_speed_m_s=2.0))
@@ -130,6 +133,22 @@ def test_numbers_of_runs() -> None:
     assert found.time_lost == pytest.approx(1.0)
     assert (found.people_collisions, found.people_touches, found.closest_m) == (1, 1, 0.0)
     assert found.near_share == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize("name", ["runs.csv", "runs.sqlite", "summary.json", "report.html"])
+@pytest.mark.parametrize("use", ["bench barn", "bench controllers map"])
+def test_where_something_else_stands_nothing_is_driven(
+    use: str, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """All courses were, and the other files were left in the folder."""
+    monkeypatch.chdir(tmp_path)
+    BY_NAME[use].write(tmp_path)
+    (tmp_path / "out" / name).mkdir(parents=True)
+    monkeypatch.setattr(barn_benchmark, "bench_barn", Mock())
+    monkeypatch.setattr(controller_benchmark, "bench_controllers", Mock())
+    assert main(list(BY_NAME[use].words)) == 2
+    assert capsys.readouterr().err == f"pilotage: out/{name}: expected a place for a file, found a folder\n"
+    assert [path.name for path in (tmp_path / "out").iterdir()] == [name]
 
 
 def test_it_drives_judges_and_writes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -212,6 +212,25 @@ def test_branch_and_bound_finds_what_looking_everywhere_finds(seed: int) -> None
         assert (seeded == best).all()
 
 
+@pytest.mark.parametrize("levels", [0, 3])
+@pytest.mark.parametrize("centre_m", [(2.0, 2.0), (0.3, 2.0), (2.0, 0.2), (4.7, 2.0), (2.0, 3.9)])
+def test_scores_are_those_of_the_cells_that_the_points_fall_into(
+    centre_m: tuple[float, float], levels: int
+) -> None:
+    """Inside a grid no point is held against its borders: clouds in it, and across each of its borders."""
+    rng = np.random.default_rng(3)
+    grid = rng.random((40, 50)).astype(np.float32)
+    points = rng.uniform(-0.8, 0.8, (26, 2))
+    bordered = np.pad(grid, 40)  # nothing was seen out there
+    scores = max_pyramid(grid, levels)
+    for shift in np.ndindex(15, 15):
+        at = centre_m + 0.1 * (np.array(shift) - 7)
+        window = (*scores, 0.0, 0.0, 0.1, points, np.array([*at, 0.0]), 0.0, np.zeros(1))
+        best, _ = search_window(*window, 0.0, PASS_OVER_NONE, 10**6, NO_SEED, False)
+        column, row = np.floor((points + at) / 0.1).astype(int).T
+        assert best[3] == pytest.approx(bordered[row + 40, column + 40].mean(dtype=float), abs=1e-9)
+
+
 def test_the_second_best_is_elsewhere() -> None:
     grid = np.zeros((30, 60), np.float32)
     grid[15, 10], grid[15, 40] = 1.0, 0.9

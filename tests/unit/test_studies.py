@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import random
+import shutil
 import signal
 import sqlite3
 import time
@@ -57,6 +58,21 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     counts = run_study(small(), folder, ONE)
     assert (counts.total, counts.done, counts.failed) == (12, 12, 0)
     return folder
+
+
+def test_where_no_page_can_stand_no_trial_is_run_again(
+    undisturbed: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The worst and the median trial were, and their folders stayed behind."""
+    folder = tmp_path / "small"
+    shutil.copytree(undisturbed, folder)
+    (folder / "report.html").unlink(missing_ok=True)
+    (folder / "report.html").mkdir()
+    before = sorted(path.name for path in folder.iterdir())
+    assert main(["report", str(folder)]) == 2
+    place = folder / "report.html"
+    assert capsys.readouterr().err == f"pilotage: {place}: expected a place for a file, found a folder\n"
+    assert sorted(path.name for path in folder.iterdir()) == before
 
 
 def test_every_shipped_study_can_be_loaded() -> None:

@@ -77,6 +77,7 @@ def barn(
     request = BarnRequest(
         courses, names, trials, workers or os.cpu_count() or 1, seed or 0, tuple(overrides or ())
     )
+    _require_places(out)
     with stdout_for_json(json):
         answer = bench_barn(request, _show if sys.stderr.isatty() else None)
         replayed = write_barn(answer, out, replays)
@@ -131,6 +132,7 @@ def controllers(
     request = CourseRequest(
         kinds, names, courses, trials, workers or os.cpu_count() or 1, seed or 0, tuple(overrides or ())
     )
+    _require_places(out)
     with stdout_for_json(json):
         answer = bench_controllers(request, _show if sys.stderr.isatty() else None)
         made = write_answer(answer, out, replays)
@@ -166,6 +168,17 @@ def _write_page(
     clearance_m = {world.number: path_clearance_m(world) for world in answer.request.worlds}
     links = _pages_of(replayed, out)
     return write_barn_report(out, BarnPage(answer.runs, published, clearance_m, answer.without_way, links))
+
+
+def _require_places(out: Path) -> None:
+    """What cannot be written in the end is told before anything is driven."""
+    from pilotage.core.whole_file import require_place
+    from pilotage.experiments.course_driving import SUMMARY
+    from pilotage.experiments.result_rows import CSV, DATABASE
+    from pilotage.report.markup import REPORT_FILE
+
+    for name in (CSV, DATABASE, SUMMARY, REPORT_FILE):
+        require_place(out / name)
 
 
 def _pages_of(replayed: Mapping[K, Path], out: Path) -> dict[K, str]:

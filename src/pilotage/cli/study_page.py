@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+from pilotage.core.whole_file import require_place
 from pilotage.experiments.run import run_mission
 from pilotage.experiments.studies.attribution import attribution_of, is_attribution
 from pilotage.experiments.studies.findings import best_settings, findings_of
@@ -12,6 +13,7 @@ from pilotage.experiments.studies.replay import mission_of_row
 from pilotage.experiments.studies.table import StudyTable, read_study
 from pilotage.records.run_data import read_run, read_team
 from pilotage.report.drawn import map_of
+from pilotage.report.markup import REPORT_FILE
 from pilotage.report.page import write_report as write_run_report
 from pilotage.report.study.examples import Example, describe, rows_to_show
 from pilotage.report.study.page import write_page
@@ -39,9 +41,10 @@ def write_study_report(
     Raises
     ------
     InputError
-        Where the folder is no study's.
+        Where the folder is no study's, or no page can stand there: then no trial is run either.
     """
     table = read_study(folder)
+    require_place(folder / REPORT_FILE)
     shown: list[Example] = []
     if table.without and on_left_out is not None:
         on_left_out(f"pictures of trials, and what metrics of plugins mean ({table.without})")

@@ -48,7 +48,7 @@ def draft_of(path: Path, end: str = "") -> Iterator[Path]:
     InputError
         Where something stands there that is no file, such as ``/dev/null``.
     """
-    _require_place(path)
+    require_place(path)
     draft = path.with_name(f"{draft_prefix(path)}draft{end}")
     try:
         with named(path, draft):
@@ -73,10 +73,16 @@ def write_whole(path: Path, text: str) -> None:
         draft.write_text(text, encoding="utf-8", errors="replace")
 
 
-def _require_place(path: Path) -> None:
+def require_place(path: Path) -> None:
     """Only a file gives way to another: who may do anything would rename the draft over a device as well.
 
-    Links are followed: ``/dev/stdout`` leads to a terminal or a pipe, and is everybody's.
+    Links are followed: ``/dev/stdout`` leads to a terminal or a pipe, and is everybody's. Who writes other
+    files or works for long before asks at once.
+
+    Raises
+    ------
+    InputError
+        Where something stands there that is no file.
     """
     try:
         mode = path.stat().st_mode

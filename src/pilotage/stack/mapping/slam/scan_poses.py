@@ -113,6 +113,7 @@ def aligned_scans(
     waiting = np.flatnonzero(between_keyframes)
     waiting = waiting[np.argsort(track.owner[waiting], kind="stable")]
     have = -1
+    fitting, offs, infos = [], [], []
     for i in waiting.tolist():
         owner = int(track.owner[i])
         if owner != have:
@@ -127,22 +128,27 @@ def aligned_scans(
         off = pose - start[i]
         off[2] = (off[2] + np.pi) % (2.0 * np.pi) - np.pi
         if status != TOO_FEW and np.hypot(off[0], off[1]) < MOST_MOVED_M and abs(off[2]) < MOST_MOVED_RAD:
-            told = told_by(hessian, float(fit[1])) / TRACK_STD_M**2
-            step, slipped[i] = _believed(off, told, slipped[i])
-            out[i] += step
-            out[i, 2] = (out[i, 2] + np.pi) % (2.0 * np.pi) - np.pi
+            fitting.append(i)
+            offs.append(off)
+            infos.append(told_by(hessian, float(fit[1])) / TRACK_STD_M**2)
+    if fitting:
+        steps, slipped[fitting] = _believed(np.array(offs), np.array(infos), slipped[fitting])
+        moved = out[fitting] + steps
+        moved[:, 2] = (moved[:, 2] + np.pi) % (2.0 * np.pi) - np.pi
+        out[fitting] = moved
     return out, slipped
 
 
-def _believed(off: FloatArray, told: FloatArray, slipped: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """How far (3,) a scan moves that an alignment would move by ``off``, and what is left (3, 3) of a slip.
+def _believed(offs: FloatArray, told: FloatArray, slipped: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """How far (M, 3) scans move that alignments would move by ``offs``, and what is left (M, 3, 3) of slips.
 
-    Alignment and place count by what they know: ``told`` (3, 3) is the alignment's information.
+    Alignment and place count by what they know: ``told`` (M, 3, 3) is the alignments' information.
     """
-    hung = HUNG_COV + slipped
+    hung, off = HUNG_COV + slipped, offs[:, :, None]
     # By the matrix inversion lemma: the inverse of what tells nothing along a corridor is not needed.
     gain = np.linalg.solve(np.eye(3) + told @ hung, told)
-    kept = 1.0 / (1.0 + float(off @ gain @ off) / DOUBTED_SQUARE)
-    left = np.linalg.solve((np.eye(3) + told @ slipped / kept).T, slipped / kept).T
+    kept = 1.0 / (1.0 + off.transpose(0, 2, 1) @ gain @ off / DOUBTED_SQUARE)
+    turned = (np.eye(3) + told @ slipped / kept).transpose(0, 2, 1)
+    left = np.linalg.solve(turned, slipped / kept)
     moved = np.linalg.solve(told + kept * np.linalg.inv(hung), told @ off)
-    return np.asarray(moved), np.asarray(0.5 * (left + left.T))
+    return np.asarray(moved[:, :, 0]), np.asarray(0.5 * (left + left.transpose(0, 2, 1)))
