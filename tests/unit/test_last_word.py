@@ -96,6 +96,22 @@ def test_a_command_is_looked_at_by_what_the_laser_shows_as_far_as_it_takes_to_st
     assert angular.allows(Twist(-0.3, 0.0))
 
 
+def test_what_was_shown_last_counts_where_no_scan_comes() -> None:
+    """Of scans of which three tenths were lost four were so in a row: who had stood drove into the wall."""
+    word = rolls(word_of({"lidar": LidarConfig()} | TOLD), lidar=scan_of(LidarConfig(), AHEAD))
+    for k in range(2, 30):
+        still = hears(word, 0.1 * k, odometry=OdometryIncrement(0.0, 0.0))
+        assert not still.allows(AHEAD_M_S)
+    assert hears(word, 3.0, lidar=scan_of(LidarConfig())).allows(AHEAD_M_S), "it has gone"
+    # Once it was far from where it was taken, or where the way there is not known, it tells nothing.
+    word = rolls(word_of({"lidar": LidarConfig()} | TOLD), lidar=scan_of(LidarConfig(), AHEAD))
+    assert hears(word, 5.0, odometry=OdometryIncrement(0.05, 0.0)).allows(AHEAD_M_S)
+    word = rolls(word_of({"lidar": LidarConfig()} | TOLD), lidar=scan_of(LidarConfig(), AHEAD))
+    for k in range(2, 44):  # 1.05 m back, and as far forth again
+        hears(word, 0.1 * k, odometry=OdometryIncrement(-0.05 if k < 23 else 0.05, 0.0))
+    assert word.allows(AHEAD_M_S)
+
+
 def test_what_is_touched_already_says_nothing_of_what_is_ahead() -> None:
     """Of all together the nearest got no nearer: beside a wall that it touched it drove into the next."""
     word = rolls(word_of({"lidar": ALL_ROUND} | TOLD), lidar=scan_of(ALL_ROUND, POST, AHEAD))

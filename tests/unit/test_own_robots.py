@@ -194,6 +194,13 @@ def test_it_turns_to_the_heading_of_its_goal(
     assert abs(run.metrics["goal_error_rad"]) <= 0.3
 
 
+def test_who_drives_by_the_polar_law_turns_too(floor: Callable[[float], str]) -> None:
+    """A metre is too short for the law to come round: it said that it had arrived 70 degrees off."""
+    goal = {"x_m": 2.2, "y_m": 1.0, "theta_rad": 1.5, "tolerance_m": 0.2, "tolerance_rad": 0.1}
+    run = drive(floor(0.9), DISC, goal=goal, navigator="pose")
+    assert run.success, run.reason
+
+
 def test_who_stands_the_wrong_way_is_told_so(floor: Callable[[float], str]) -> None:
     goal = {"theta_rad": -2.0, "tolerance_rad": 0.1}
     run = drive(floor(1.5), CAR, goal=goal, **DRIVERS[1], smoother="shortcut")

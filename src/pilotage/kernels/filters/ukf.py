@@ -27,6 +27,9 @@ ALPHA = 0.1
 """A quadratic has its variance (1 + alpha^2 (n - 1) / beta) times too large: small, yet far from rounding."""
 BETA = 2.0
 KAPPA = 0.0
+ROUNDED = 1e-6
+"""Such a share of a variance may be rounding: the points lie close together, far from the origin, and the
+middle one's weight is -99."""
 
 
 @kernel
@@ -35,8 +38,8 @@ def sigma_points(
 ) -> bool:
     """Fill points (2 n + 1, n) and their weights for mean and covariance; False where ``cov`` has no root.
 
-    The square root is Cholesky's; a covariance that is only semi-definite (a variance of zero) is taken
-    with zero spread in that direction.
+    The square root is Cholesky's; a covariance that is only semi-definite (a start that is known exactly) is
+    taken with zero spread in that direction.
     """
     n = mean.shape[0]
     scale = ALPHA * ALPHA * (n + KAPPA)
@@ -47,9 +50,11 @@ def sigma_points(
             for k in range(j):
                 total -= root[i, k] * root[j, k]
             if i == j:
-                if total < -1e-12 * max(cov[i, i], 1e-300):
+                least = ROUNDED * max(cov[i, i], 1e-300)
+                if total < -least:
                     return False
-                root[i, i] = math.sqrt(max(total, 0.0))
+                # What rounding leaves where nothing is would be divided by.
+                root[i, i] = math.sqrt(total) if total > least else 0.0
             elif root[j, j] > 0.0:
                 root[i, j] = total / root[j, j]
     spread = math.sqrt(scale)

@@ -26,7 +26,11 @@ OWN_M = 0.05
 SAME_STDS = 4.0
 """By so many deviations of a range neighbouring ones of one surface differ at most."""
 PERIODS = 3.0
-"""A scan counts for so many of its laser's periods, where no other comes."""
+"""A scan counts for so many of its laser's periods;"""
+KEPT_M = 1.0
+"""where no other comes, as of a laser whose scans are lost, until the robot is so far from where it was."""
+MISSED_STEPS = 1.5
+"""It is told of every step, or begins anew."""
 EPSILON_S = 1e-9
 NOTHING: FloatArray = np.empty((0, 2))
 
@@ -58,11 +62,18 @@ class LaserView:
     def take_in(self, readings: Readings, here: tuple[float, float, float]) -> None:
         """A step's scan, and where the robot is now."""
         t_s, scan = readings.t_s, readings.by_sensor.get(self._name)
-        while self._scans and t_s > self._scans[0].until_s:
-            del self._scans[0]
         if isinstance(scan, LidarScan):
             nearest_m = float(np.fmin.reduce(scan.ranges_m)) if len(scan.ranges_m) else math.inf
             self._scans.append(Scan(t_s + self._valid_s, nearest_m, scan.ranges_m, here))
+        while self._scans and t_s > self._scans[0].until_s:
+            x, y, _ = self._scans[0].at
+            if len(self._scans) == 1 and math.hypot(here[0] - x, here[1] - y) < KEPT_M:
+                break  # what it showed has not gone because nothing is shown any more
+            del self._scans[0]
+
+    def forget(self) -> None:
+        """Where the robot has moved to since is not known."""
+        self._scans.clear()
 
     def near(self, within_m: float, here: tuple[float, float, float]) -> list[tuple[Scan, float]]:
         """Scans that may show something so near to where the robot is, and the ranges that it may have."""
@@ -85,7 +96,8 @@ class ScanGuard:
 
     Who knows his place badly passes walls by his map that stand elsewhere. What a laser showed counts
     for three of its periods, as seen from where the robot has moved to since: the edge of a post that is
-    passed is hit by few beams, and a laser may be slower than the robot's steps.
+    passed is hit by few beams, and a laser may be slower than the robot's steps. The last scan counts on
+    where no other comes.
     Whoever gets no nearer to what he touches, or is about to, may. Where no laser looks it knows nothing, and
     of what comes up to the robot by itself no more than where it was.
     """
@@ -112,6 +124,9 @@ class ScanGuard:
         """Take in what came in a step; to be called at every one, before commands are asked about."""
         if not self._lasers:
             return
+        if readings.t_s - self._t_s > MISSED_STEPS * self._dt_s:
+            for laser in self._lasers:
+                laser.forget()
         self._t_s = readings.t_s
         moved = ahead_m, lateral_m, angle_rad = self._motion.step(readings)
         self._here = turned_part(*self._here, *moved, 1.0)

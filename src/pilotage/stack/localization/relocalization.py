@@ -37,8 +37,8 @@ LEAST_USUAL = 0.6
 """What is usual at least: share of the beams on the map's walls."""
 SAME_M, SAME_RAD = 0.3, 0.15
 """A place so near to where the cloud is needs no other cloud."""
-STRAYS, TURNS_RAD_PER_M = 0.1, 0.02
-"""Share of its path that the odometry leads astray by, and how much it turns by the metre, at most."""
+STRAYS, TURNS_RAD_PER_M = 0.2, 0.1
+"""Share of its path, turns included, that the odometry leads astray by, and how far it turns, at most."""
 STDS = np.array([0.1, 0.1, 0.02])
 """Of the cloud that begins at a place found."""
 

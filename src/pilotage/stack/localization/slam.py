@@ -54,7 +54,8 @@ class SlamLocalizer:
         self._slam = OnlineSlam(config)
         self._mount = self._scanner.mount.as_array()
         self._unmount = between(self._mount, np.zeros(3))
-        self._frame = composed(initial.pose.as_array(), self._mount)
+        self._begins = initial.pose.as_array()
+        self._frame = composed(self._begins, self._mount)
         self._initial_cov = initial.cov
         self._angles = self._scanner.beam_angles_rad()
         self._moved, self._scan_s = np.zeros(3), 0.0
@@ -76,6 +77,10 @@ class SlamLocalizer:
             self._align(readings.t_s, scan)
         if self.scan_grid.poses.size:
             self.belief = self._told()
+        elif isinstance(odometry, OdometryIncrement):
+            here = composed(self._begins, self._moved)
+            cov = carried_covariance(self._initial_cov, self._begins, here)
+            self.belief = Belief(Pose2.from_array(here), cov, self.belief.status)
         return self.belief
 
     def close_loops(self) -> int:
@@ -93,6 +98,8 @@ class SlamLocalizer:
         ranges = echoes(scan.ranges_m, self._scanner)
         cloud = cloud_of_beams(ranges, self._angles, self._scanner.beam_step_rad, self._config.max_range_m)
         step = None
+        if not self.scan_grid.poses.size:  # a slow scanner's first scan is of where it has driven to
+            self._frame = composed(composed(self._begins, self._moved), self._mount)
         if self._odometry is not None and self._config.use_odometry:
             step = composed(composed(self._unmount, self._moved), self._mount)
         before = self._slam.accepted
@@ -121,5 +128,5 @@ class SlamLocalizer:
         scanner = composed(self._frame, self._slam.pose)
         own = turn @ self._slam.pose_covariance @ turn.T
         out = carried_covariance(own, scanner, base)
-        out += carried_covariance(self._initial_cov, self._frame, base)
+        out += carried_covariance(self._initial_cov, self._begins, base)
         return 0.5 * (out + out.T)

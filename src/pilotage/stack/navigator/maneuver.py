@@ -19,6 +19,7 @@ from pilotage.stack.control.give_way import GiveWay, GiveWayConfig
 from pilotage.stack.control.kanayama import KanayamaConfig, KanayamaController
 from pilotage.stack.control.last_word import LastWord
 from pilotage.stack.control.own_half import OwnHalf, OwnHalfConfig
+from pilotage.stack.control.wander import WanderConfig
 from pilotage.stack.interface import NAVIGATORS, Belief, BeliefStatus, StackStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
@@ -36,6 +37,7 @@ from pilotage.stack.navigator.own_map import OwnMap
 from pilotage.stack.navigator.reference import STANDS, Reference
 from pilotage.stack.navigator.timed_path import laid_out, with_turns
 from pilotage.stack.navigator.trail import Trail
+from pilotage.stack.navigator.wandering import Wandering
 from pilotage.stack.navigator.yielding import Act, Yielding, YieldingConfig
 from pilotage.stack.perception.moving_bodies import MovingBodies, MovingBodiesConfig
 from pilotage.stack.planning.outline import car_of, ground_of
@@ -59,6 +61,8 @@ WALL_M, LEAST_M = 0.02, 0.005
 """Kept from the walls of the map on a path for the outline, or half of what the path keeps; and at least."""
 MOST_STOPS, STEP_BACK_M = 12, 0.5
 """How often it plans anew where its lasers show no room for its plan, and from how far before that."""
+DOUBT_S = 10.0
+"""Who is lost stands for so long, and drives about then."""
 SEEN_M = 0.05
 """What is seen and on no map counts as discs of this radius where a path around it is planned."""
 
@@ -82,6 +86,8 @@ class ManeuverConfig(Config):
     yielding: YieldingConfig = YieldingConfig()
     """What it does where that stays in its way."""
     moving_bodies: MovingBodiesConfig = MovingBodiesConfig()
+    wander: WanderConfig = WanderConfig()
+    """How it drives about while it is lost."""
     give_way: GiveWayConfig = GiveWayConfig()
     """Alone on its floor it gives way to who walks; mates each stop in their own half."""
 
@@ -97,7 +103,7 @@ class ManeuverNavigator(LocalizingNavigator):
     way to who walks, who comes farther than his half. Where that stays in the way it
     plans around it, or backs out of the way that it came. Where it cannot keep up with the plan it plans
     anew; what a path that covers a floor left of it, as far as the robot knows, is driven in the end. Lost,
-    it stands.
+    it stands, and who can turn on the spot drives about after a while.
     """
 
     def __init__(
@@ -129,14 +135,16 @@ class ManeuverNavigator(LocalizingNavigator):
             config.moving_bodies, robot, chart, minds=not task.mates, unexplained=self._own_half.unexplained
         )
         self._gives_way = GiveWay(config.give_way, robot, self._bodies)
-        self._yielding = Yielding(config.yielding, robot.dt_s, robot.streams.stream("yielding"))
+        self._begin_anew()
         rng = robot.streams.stream("planner")
         self._plan = GlobalPlan(
             parts.planner, parts.smoother, chart, rng, journal, robot=robot, as_planned=True
         )
         self._reference = Reference(np.zeros((0, 5)), robot.dt_s)
         self._last_word = LastWord(robot)
-        self._replans, self._rests, self._stops = 0, 0, 0
+        self._wandering = Wandering(config.wander, robot, self._localizer, self._last_word)
+        self._lost_s, self._wandered = math.inf, False
+        self._replans, self._rests = 0, 0
         self._backs = False
         self._to_walls_m = 0.0
         self._trail: Trail | None = None
@@ -144,7 +152,7 @@ class ManeuverNavigator(LocalizingNavigator):
         if self.belief.status is BeliefStatus.LOST:
             raise InputError(
                 "navigator 'maneuver': expected to be told its start (stack.initial), found it lost; it "
-                "stands while it is: take navigator goal, which drives until it has found itself"
+                "plans from there: take navigator goal, which drives until it has found itself"
             )
         self._think(0.0)
         if self._plan.hopeless and self._plan.too_tight:
@@ -233,8 +241,16 @@ class ManeuverNavigator(LocalizingNavigator):
         """Localize, move the reference on, and follow it."""
         belief = self._localizer.step(readings)
         self._last_word.take_in(readings)
-        if self._status is not StackStatus.RUNNING or belief.status is BeliefStatus.LOST:
+        if self._status is not StackStatus.RUNNING:
             return STOP
+        if belief.status is BeliefStatus.LOST:
+            return self._looks_around(readings)
+        self._lost_s = math.inf
+        if self._wandered:
+            self._wandered = False
+            self._journal.say(readings.t_s, "found", "the robot knows where it is and plans from there")
+            self._begin_anew()
+            self._think(readings.t_s)
         if readings.t_s >= self._think_at_s:
             self._think(readings.t_s)
         if self._think_at_s < math.inf or self._status is not StackStatus.RUNNING:
@@ -269,6 +285,23 @@ class ManeuverNavigator(LocalizingNavigator):
         if act is not Act.NOTHING:
             return self._yields(readings.t_s, act)
         return command
+
+    def _looks_around(self, readings: Readings) -> Twist:
+        """Lost: it waits, as doubts pass, and drives about then, for who stands sees nothing new."""
+        self._lost_s = min(self._lost_s, readings.t_s)
+        if readings.t_s - self._lost_s < DOUBT_S or self._robot.motion.least_turning_radius_m > 0.0:
+            return STOP
+        if not self._wandered:
+            self._wandered = True
+            self._journal.say(readings.t_s, "lost", "the robot does not know where it is: drives about")
+        return self._wandering.step(readings)
+
+    def _begin_anew(self) -> None:
+        """Nothing leads back to where it was."""
+        self._yielding = Yielding(
+            self._config.yielding, self._robot.dt_s, self._robot.streams.stream("yielding")
+        )
+        self._stops = 0
 
     def _toward(self, pose: Pose2, there: Pose2, feedforward: Twist) -> Twist:
         """The command that follows the reference."""

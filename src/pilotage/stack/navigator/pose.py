@@ -23,6 +23,8 @@ from pilotage.stack.navigator.navigator import (
     arrival_within_m,
     localizer_of,
     only_goal,
+    turn_at_goal_rad,
+    turned_by,
 )
 
 
@@ -39,7 +41,8 @@ class PoseConfig(PolarPoseConfig):
 class PoseNavigator(LocalizingNavigator):
     """Drives by the polar law from where it believes to be (rover report, chapter 2).
 
-    Arrives at the first step at which it believes to be near enough. It knows no way around anything: before
+    Arrives at the first step at which it believes to be near enough; who can turn on the spot does so there
+    for the goal's heading, where its lasers show room. It knows no way around anything: before
     what its lasers show in its way it stands, and fails where that stays; what they do not show it drives
     over.
     """
@@ -62,6 +65,7 @@ class PoseNavigator(LocalizingNavigator):
         self._law = PolarPoseController(config, pose, robot.motion, robot.dt_s)
         self._tolerance_m = arrival_within_m(config.arrival_m, task.goal_tolerance_m)
         self._last_word, self._patience_s = LastWord(robot), config.patience_s
+        self._task, self._motion, self._is_there = task, robot.motion, False
         self._channel = journal.channel({"distance_to_go_m": "m"})
 
     def step(self, readings: Readings) -> Twist:
@@ -72,7 +76,11 @@ class PoseNavigator(LocalizingNavigator):
         self._last_word.take_in(readings)
         if self._status is not StackStatus.RUNNING:
             return STOP
-        if to_go_m <= self._tolerance_m:
+        self._is_there |= to_go_m <= self._tolerance_m
+        if self._is_there:
+            turn = self._turn(pose)
+            if turn is not None and self._last_word.allows(turn):
+                return turn
             self._end(readings.t_s, StackStatus.ARRIVED, f"within {self._tolerance_m:g} m of the goal")
             return STOP
         twist = self._law.command(pose.x_m, pose.y_m, pose.theta_rad)
@@ -83,3 +91,10 @@ class PoseNavigator(LocalizingNavigator):
         if self._last_word.held_s >= self._patience_s:
             self._end(readings.t_s, StackStatus.FAILED, f"stuck: {self._last_word.why}{AROUND}")
         return STOP
+
+    def _turn(self, pose: Pose2) -> Twist | None:
+        """What is left of the goal's heading; None where it is there, or has to drive to turn."""
+        off_rad = turn_at_goal_rad(self._task, pose)
+        if not off_rad or self._motion.least_turning_radius_m > 0.0:
+            return None
+        return turned_by(off_rad, self._motion.top_turn_rate_rad_s)
