@@ -49,7 +49,7 @@ def test_a_start_that_is_known_exactly_moves() -> None:
             distance, angle = 0.1 * min(0.04 * k, 0.5), -0.1 * min(0.08 * k, 1.0)
             noise = np.diag([1.3e-4 * distance, 2e-5 * abs(angle) + 1e-6 * distance])
             ukf.predict(pose, cov, distance, angle, noise, True)
-            true = np.array(exact_arc(*true, distance, angle))
+            true[:] = exact_arc(float(true[0]), float(true[1]), float(true[2]), distance, angle)
         assert pose == pytest.approx(true, abs=1e-3)
         assert np.linalg.eigvalsh(cov)[0] > 0.0
 
