@@ -119,3 +119,8 @@ class TestInADoor:
         metrics = judged(seed, 200.0, "team.size=1", f"world.map={{map: two-rooms, walls_m: {walls}}}")
         assert metrics["idleness_worst_s"] < 60.0
         assert metrics["collisions"] == 0
+
+    def test_who_meets_him_where_a_corridor_ends_finds_a_way_past(self) -> None:
+        """As far around him as around a mate there was none: both stood there from the 458th second on."""
+        metrics = judged(0, 530.0)
+        assert metrics["deadlocks"] == metrics["collisions"] == metrics["people_touches"] == 0

@@ -32,6 +32,8 @@ ROUND_M = 0.06
 """Returns that lie so near to a rim as large as its own, on average, are of a mate's."""
 TALKS_PERIODS = 3.0
 """A body is that of a mate who said so lately that it is there."""
+AS_ONE = np.array([1.0, 1j])
+"""A place as one number, for finding returns among others."""
 PEOPLE_M_S = 1.4
 """Who is no mate may come on at a walk, and gives way to nobody."""
 
@@ -106,6 +108,19 @@ class Motion:
             disc_returns.within(senses.strange, senses.config.watch_m) if len(senses.strange) else NO_POINTS
         )
 
+    def _around(self, beside: FloatArray) -> FloatArray:
+        """(M, 3) what it goes around, map frame, of returns (M, 2) of what may move.
+
+        A path nearer to a mate than commands may come is crept along, and mates find another one. Who is none
+        gives way to nobody: beside him any path that there is will do.
+        """
+        senses = self._senses
+        discs = _discs(senses.on_map(beside), self.shut_m - senses.radius_m)
+        if len(senses.people):
+            of_people = np.isin(beside @ AS_ONE, senses.people @ AS_ONE)
+            discs[of_people, 2] = self._clearance_m
+        return discs
+
     def room_ahead_m(self, time: FloatArray) -> tuple[float, float]:
         """Half the width of the narrowest place down a field, for claims and for lanes."""
         known, pose = self._room, self._senses.pose
@@ -146,9 +161,8 @@ class Motion:
         lane_m *= min(1.0, self.to_go_s / MERGE_S)
         self.blocked = self.taken = False
         beside, still = self._beside(), self.standing
-        # A path nearer to what may move than commands may come is crept along.
-        around_m, body_m = self.shut_m - senses.radius_m, self.body_m
-        discs = _discs(senses.on_map(beside), around_m) if len(beside) and not first else NO_DISCS
+        body_m = self.body_m
+        discs = self._around(beside) if len(beside) and not first else NO_DISCS
         if len(still):
             discs = np.concatenate([discs, _discs(still, body_m)])
             # Beside who stands where it wants to be it goes around him, on either side, and that will do.
