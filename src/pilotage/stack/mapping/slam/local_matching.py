@@ -208,12 +208,15 @@ class LocalMatcher:
         self.views.added[0] = 0
         return out
 
-    def find(self, aside: Aside, cloud: FloatArray, centre: FloatArray, half_m: float) -> Fit | None:
-        """Look for a scan all round in what was set aside; None where it fits nowhere, or in two places."""
+    def find(
+        self, aside: Aside, cloud: FloatArray, centre: FloatArray, half_m: float, turn_rad: float
+    ) -> Fit | None:
+        """Look for a scan in what was set aside, so far from a pose and turned by so much at most; None where
+        it fits nowhere, or in two places."""
         near = in_range(cloud)
         if near.shape[0] < LEAST_FOUND:
             return None
-        points, turns = every_second(near), np.arange(-np.pi, np.pi, SEARCH_STEP_RAD)
+        points, turns = every_second(near), np.arange(-turn_rad, turn_rad, SEARCH_STEP_RAD)
         best = aside.around.best(points, centre, half_m, turns, LEAST_SCORE_ROUND)
         if best is None:
             return None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -35,6 +36,9 @@ RIGID = 1e4 * np.eye(3)
 HEAL_SCANS, HEAL_KEYFRAMES = 10, 24
 """A scan after a break is looked for in what was before: each of the first ones, then keyframes."""
 HEAL_M, HEAL_M_PER_KEYFRAME, HEAL_MOST_M = 0.8, 0.1, 2.5
+TORN_RAD = 3.0 * float(np.sqrt(BREAK_SLIP[2, 2]))
+"""Three standard deviations of what the odometry may have turned wrongly over a break: a door looks alike
+from both its sides."""
 AGREE_M, AGREE_RAD = 0.2, 0.1
 """Two scans must be found, the second one from another place, and agree."""
 SHORT = 5
@@ -93,12 +97,14 @@ class LocalTrack:
 class _Torn:
     """A break that may still be joined: what was before, the keyframe and the scan at which the piece began.
 
-    ``candidate`` is where a scan was, and by which motion (3,) the piece would have to be moved by it.
+    ``turn_rad`` is how far the piece may have to be turned, ``candidate`` where a scan was, and by which
+    motion (3,) the piece would have to be moved by it.
     """
 
     aside: Aside
     keyframe: int
     scan: int
+    turn_rad: float
     candidate: tuple[FloatArray, FloatArray] | None = None
 
 
@@ -234,7 +240,7 @@ class Tracker:
             broken = step is None or self.lost_run > GUESSED_SCANS or is_far(step)
             track.slip[:] += BLIND_BREAK_SLIP if step is None else BREAK_SLIP if broken else GUESS_SLIP
             if broken:
-                self._tear()
+                self._tear(math.pi if step is None else TORN_RAD)
         else:
             self.lost_run, hessian = 0, fit.hessian
             if not holds_along(fit.pose, fit.hessian, fit.weight):
@@ -281,8 +287,8 @@ class Tracker:
         """Whether a scan is far enough from the last keyframe to become one."""
         return is_new(motion, self._config.keyframe_distance_m, self._config.keyframe_turn_rad)
 
-    def _tear(self) -> None:
-        """Begin a new piece; one that has hardly begun is dropped."""
+    def _tear(self, turn_rad: float) -> None:
+        """Begin a new piece, turned by so much at most; one that has hardly begun is dropped."""
         torn, count = self._torn, len(self._keyframes)
         aside = self._matcher.set_aside()
         if torn is not None and count - torn.keyframe < SHORT:
@@ -290,10 +296,11 @@ class Tracker:
             for kept in (self._keyframes, self._clouds, self._hessians, self._slips):
                 del kept[torn.keyframe :]
             self._owner = [min(owner, torn.keyframe - 1) for owner in self._owner]
-            self._torn = replace(torn, scan=len(self._poses), candidate=None)
+            turn_rad = min(torn.turn_rad + turn_rad, math.pi)
+            self._torn = replace(torn, scan=len(self._poses), turn_rad=turn_rad, candidate=None)
         else:
             self._breaks.append(count)
-            self._torn = None if aside is None else _Torn(aside, count, len(self._poses))
+            self._torn = None if aside is None else _Torn(aside, count, len(self._poses), turn_rad)
 
     def _heal(self, torn: _Torn, cloud: FloatArray, new: bool) -> None:
         """Look for a scan in what was before the break; where two agree, move the piece to where they are."""
@@ -308,8 +315,8 @@ class Tracker:
         fit = None
         if torn.candidate is not None and self._is_new(between(torn.candidate[0], pose)):
             expected = np.asarray(composed(torn.candidate[1], pose))
-            fit = self._matcher.find(torn.aside, cloud, expected, HEAL_M)
-        fit = fit or self._matcher.find(torn.aside, cloud, pose, half_m)
+            fit = self._matcher.find(torn.aside, cloud, expected, HEAL_M, torn.turn_rad)
+        fit = fit or self._matcher.find(torn.aside, cloud, pose, half_m, torn.turn_rad)
         if fit is None:
             return
         moved = composed(fit.pose, between(pose, np.zeros(3)))
