@@ -253,3 +253,19 @@ def test_starts_of_a_team_are_told_by_the_name_they_were_given_under() -> None:
         match=r"^team\.starts\.0: expected a mapping with keys of theta_rad, x_m, y_m, found \[1, 1\]",
     ):
         load_mission("museum-patrol", ["team.size=2", "team.starts=[[1, 1], [3, 3]]"], 0)
+
+
+@pytest.mark.parametrize(
+    ("settings", "least"),
+    [(["robot.sensors.lidar.beams=24"], 36), (["robot.motion.max_speed_m_s=0.3"], None)],
+)
+def test_a_laser_too_coarse_for_a_team_is_refused(settings: list[str], least: int | None) -> None:
+    """A mate was met by one beam alone, which may be dust, and robots ran into each other."""
+    settings = ["robot.sensors.lidar.beams=24", *settings]
+    if least is None:
+        build(load_mission("museum-patrol", settings, 0))
+        return
+    words = rf"^robot\.sensors\.lidar\.beams: expected {least} or more, .* found 24$"
+    with pytest.raises(InputError, match=words):
+        build(load_mission("museum-patrol", settings, 0))
+    build(load_mission("museum-patrol", [*settings, "team.size=1"], 0))

@@ -9,6 +9,7 @@ import numpy as np
 from pilotage.core.errors import InputError
 from pilotage.core.types import STOP, Twist
 from pilotage.maps.world_map import WorldMap
+from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import Readings
 from pilotage.stack.control.last_word import LastWord
 from pilotage.stack.interface import NAVIGATORS, Belief, BeliefStatus, StackStatus
@@ -18,6 +19,7 @@ from pilotage.stack.localization.localizer import Abilities
 from pilotage.stack.navigator.navigator import Parts, localizer_of
 from pilotage.stack.navigator.patrol.config import PatrolNavigatorConfig
 from pilotage.stack.navigator.patrol.context import Context
+from pilotage.stack.navigator.patrol.motion import LATENCY_S
 from pilotage.stack.navigator.patrol.paths import roadmap_for
 from pilotage.stack.navigator.patrol.precedence import Leading, precedence
 from pilotage.stack.navigator.patrol.senses import SIGMAS
@@ -78,6 +80,8 @@ class PatrolNavigator:
         able = Abilities.of(self._localizer)
         if not able.on_map:
             _check_start(task.initial, parts.patrol)
+        if len(parts.patrol.starts) > 1:
+            _check_beams(config, robot)
         self._tell_mates = able.tell_mates
         self._telemetry = journal.channel(COLUMNS, first=True)
         journal.counts |= {"gave_way": 0, "alarms": 0}
@@ -159,4 +163,20 @@ def _check_start(start: Belief, task: PatrolTask) -> None:
             "navigator 'patrol': expected a localizer that finds its place on the map, found one that keeps "
             f"what it is wrong by at the start, up to {wrong_m:.1f} m at the farthest place to visit; take "
             "stack.localizer: laser, or a stack.initial of smaller variances"
+        )
+
+
+def _check_beams(config: PatrolNavigatorConfig, robot: RobotKnowledge) -> None:
+    """Refuse a laser that may show a mate by one beam alone, which may be dust, where both still can stop."""
+    name, lidar = robot.one_sensor(LidarConfig, "navigator 'patrol'")
+    motion, speed_m_s = robot.motion, robot.motion.top_speed_m_s
+    braking_m_s2 = min(motion.braking_m_s2, speed_m_s / robot.dt_s)
+    reacts_s = max(1.0 / lidar.rate_hz, robot.dt_s) + LATENCY_S
+    stop_m = speed_m_s * reacts_s + 0.5 * speed_m_s**2 / braking_m_s2
+    half_rad = math.asin(robot.radius_m / (2.0 * (robot.radius_m + stop_m) + config.gap_m))
+    if lidar.beam_step_rad > half_rad:
+        least = math.ceil(lidar.beams * lidar.beam_step_rad / half_rad)
+        raise InputError(
+            f"robot.sensors.{name}.beams: expected {least} or more, two of which meet a team mate while both "
+            f"can stop from {speed_m_s:g} m/s, found {lidar.beams}"
         )
