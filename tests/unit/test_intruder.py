@@ -121,6 +121,11 @@ class TestInADoor:
         assert metrics["collisions"] == 0
 
     def test_who_meets_him_where_a_corridor_ends_finds_a_way_past(self) -> None:
-        """As far around him as around a mate there was none: both stood there from the 458th second on."""
+        """As far around him as around a mate there was none: both stood there from the 458th second on.
+
+        And in a passage for one, from the 104th on, a robot waited for him to go back as a mate would: the
+        team planned around him then, and around nobody when he had gone.
+        """
         metrics = judged(0, 530.0)
         assert metrics["deadlocks"] == metrics["collisions"] == metrics["people_touches"] == 0
+        assert metrics["idleness_worst_s"] < 1.5 * metrics["idleness_bound_s"]

@@ -16,6 +16,7 @@ from pilotage.core.types import FloatArray
 from pilotage.kernels.control import disc_returns, eikonal
 from pilotage.stack.navigator.patrol.context import Context
 from pilotage.stack.navigator.patrol.passage import CLAIM_M, Stretch, claimed, precedes, relation, stretch_of
+from pilotage.stack.navigator.patrol.senses import TOLD_M
 from pilotage.stack.patrol import refuges
 from pilotage.stack.patrol.roadmap import STEP_M
 from pilotage.stack.patrol.word import Claim
@@ -177,7 +178,8 @@ def has_lost(context: Context, stretch: Stretch) -> bool | None:
 def has_less_far(context: Context, stretch: Stretch) -> tuple[bool, FloatArray | None]:
     """From inside, before somebody who says nothing: whether it goes back, and the field to where.
 
-    Who has less far to, by the map and what both can see; where it is as far for both chance decides.
+    Who has less far to, by the map and what both can see; where it is as far for both chance decides. Before
+    who is no mate it goes in any case: he gives way to nobody.
     """
     pose, roadmap = context.pose, context.roadmap
     bodies = context.bodies_on_map()
@@ -196,6 +198,8 @@ def has_less_far(context: Context, stretch: Stretch) -> tuple[bool, FloatArray |
     if own is None:
         return False, None
     goes = own_m < their_m if not abs(own_m - their_m) <= TIE_M else bool(context.rng.random() < 0.5)
+    people = context.on_map(context.people)
+    goes |= bool((np.hypot(people[:, 0] - x, people[:, 1] - y) <= context.radius_m + TOLD_M).any())
     return goes, refuge(context, own.mouth_xy_m, own.outwards, np.array([x, y]))
 
 
