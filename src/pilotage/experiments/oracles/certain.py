@@ -9,8 +9,9 @@ from pilotage.stack.interface import Belief
 
 SURE_VAR = 1e-8
 """Variance (m^2, rad^2) of a belief that is the truth: small, and still one that can be inverted."""
+_COV = SURE_VAR * np.eye(3)
 
 
 def exactly(pose: Pose2) -> Belief:
     """The truth, almost certain."""
-    return Belief(pose, SURE_VAR * np.eye(3))
+    return Belief(pose, _COV.copy())

@@ -36,7 +36,8 @@ class OwnMap:
         self.barriers = self.walls if same else NearWalls(told.barriers.segments_m)
         self.known_circles_m = told.walls.circles_m
         self._mapper = mapper
-        self._shown = self._mapped = self._found = self.known_circles_m[:0]
+        # One array as long as nothing is added: what is joined from it need not be joined anew.
+        self._none = self._shown = self._mapped = self._found = self.known_circles_m[:0]
         self._circles = self._last_found = self.known_circles_m
 
     def show(self, points_m: FloatArray) -> None:
@@ -48,13 +49,13 @@ class OwnMap:
     def forgets(self) -> bool:
         """Whether there was anything shown on the map, which is gone now."""
         had = len(self._shown) > 0
-        self._shown = self._shown[:0]
+        self._shown = self._none
         return had
 
     @property
     def mapped_circles_m(self) -> FloatArray:
         """(M, 3) what the mapper added."""
-        return self._shown[:0] if self._mapper is None else self._mapper.circles_m
+        return self._none if self._mapper is None else self._mapper.circles_m
 
     @property
     def found_circles_m(self) -> FloatArray:
