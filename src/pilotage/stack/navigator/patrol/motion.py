@@ -86,10 +86,9 @@ class Motion:
 
     def watch(self) -> None:
         """Look who stands, in a scan, and who comes as no mate would."""
-        self._onward = self._meets.step(self._senses)
-        self.standing = self._still.step(
-            self._senses.t_s, self._mute(self._beside()), self._senses.fell_silent()
-        )
+        beside = self._beside()
+        self._onward = self._meets.step(self._senses, beside)
+        self.standing = self._still.step(self._senses.t_s, self._mute(beside), self._senses.fell_silent())
 
     def _give_way_to_nobody(self) -> FloatArray:
         """(P, 2) returns, base frame, of people and of who comes as they do."""

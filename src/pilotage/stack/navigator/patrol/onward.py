@@ -25,13 +25,10 @@ class Onward:
         self._reaction_s, self._braking_m_s2 = reaction_s, braking_m_s2
         self._before_m, self._before_s = NO_POINTS, -np.inf
 
-    def step(self, senses: Senses) -> FloatArray:
-        """(P, 2) returns of a scan, base frame, of who comes on so."""
+    def step(self, senses: Senses, near: FloatArray) -> FloatArray:
+        """(P, 2) those of a scan's returns (M, 2) near by, base frame, of who comes on so."""
         before_m, since_s = self._before_m, senses.t_s - self._before_s
         self._before_m, self._before_s = senses.strange_on_map(), senses.t_s
-        near = (
-            disc_returns.within(senses.strange, senses.config.watch_m) if len(senses.strange) else NO_POINTS
-        )
         if not (len(near) and len(before_m) and 0.0 < since_s < LATE_S):
             return NO_POINTS
         seen_m = senses.pose.seen(before_m)
