@@ -112,6 +112,28 @@ def test_on_a_map_ways_lead_through_what_the_outline_fits(
     assert any(map(leads_through, range(12))) == crosses
 
 
+def test_what_is_drawn_on_a_map_is_the_same_wherever_it_lies_and_is_called_from(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "there").mkdir()
+    file, copy = rooms(tmp_path, 0.6), rooms(tmp_path / "there", 0.6)
+    monkeypatch.chdir(tmp_path)
+    courses = [drawn(one).settings for one in (file, copy, "rooms.yaml", "./there/rooms.yaml")]
+    for key in ("world.start", "world.goal"):
+        assert [course[key] for course in courses[1:]] == 3 * [courses[0][key]]
+
+
+def test_places_are_found_on_a_map_where_few_lie_far_enough_apart(tmp_path: Path) -> None:
+    """Whoever stands in the middle of such a room has no goal: of pairs drawn by lot few count."""
+    file = rooms(tmp_path, 0.3)
+    for number in range(40):
+        places = drawn(file, number).settings
+        start, goal = (
+            np.array([places[key][axis] for axis in ("x_m", "y_m")]) for key in ("world.start", "world.goal")
+        )
+        assert 2.5 <= math.hypot(*(goal - start)) <= 12.0
+
+
 def test_a_crossing_begins_where_nobody_stands(tmp_path: Path) -> None:
     path = tmp_path / "tracks.txt"
     path.write_text("".join(f"{10 * k}\t1\t{0.1 * k:.2f}\t0.0\n" for k in range(200)))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from functools import partial
@@ -27,7 +26,7 @@ from pilotage.experiments.course_driving import (
     row_of,
     write_results,
 )
-from pilotage.experiments.course_families import DRAWN, Course, Driver, make_course_of
+from pilotage.experiments.course_families import DRAWN, Course, Driver, family_word, make_course_of
 from pilotage.experiments.mission import mission_of
 from pilotage.missions.mission import Mission
 from pilotage.stack.control.local.drive import polygon_around
@@ -141,7 +140,7 @@ def course_run_mission(
     InputError
         Where the controller or an override is not what it should be.
     """
-    draw = np.random.default_rng([request.seed, course.number, trial, *os.fsencode(course.family)])
+    draw = np.random.default_rng([request.seed, course.number, trial, *family_word(course.family)])
     name = visible(Path(course.family).stem) if course.family not in DRAWN else course.family
     settings: dict[str, Any] = {
         "mission": f"{name}-{course.number}-{trial}-{controller}"[-100:],

@@ -43,6 +43,8 @@ APART_M = (2.5, 12.0)
 STEP_M = 0.01
 AROUND_M = 3.0
 TRIES = 1000
+STARTS = 200
+"""Most places tried as a start."""
 SEARCHES = 20
 MOST_CELLS = 200_000
 CELL_M = 0.04
@@ -86,7 +88,7 @@ def make_course_of(family: str, number: int, seed: int, driver: Driver) -> Cours
     InputError
         Where a file is not what it should be.
     """
-    rng = np.random.default_rng([seed, number, *os.fsencode(family)])
+    rng = np.random.default_rng([seed, number, *family_word(family)])
     if family == DOORS:
         return _walled(family, number, *_doors(rng), driver)
     if family == CORRIDOR:
@@ -98,6 +100,11 @@ def make_course_of(family: str, number: int, seed: int, driver: Driver) -> Cours
     if family.endswith(".txt"):
         return _crossing(family, number, rng, driver)
     return _on_map(family, number, rng, driver)
+
+
+def family_word(family: str) -> bytes:
+    """What of a family its draws depend on: of a file its name alone, wherever it lies and is called from."""
+    return os.fsencode(Path(family).name)
 
 
 def _places(start: tuple[float, float, float], goal: tuple[float, float]) -> dict[str, Any]:
@@ -291,11 +298,15 @@ def _two_places(
         raise InputError(f"{file}: expected a map with room for the robot, found none")
     solid = np.array(field.origin_xy_m) + spacing * np.argwhere(field.distance_m <= 0.5 * spacing)[:, ::-1]
     searched = 0
-    for _ in range(TRIES):
-        one, other = (tuple(cell) for cell in cells[rng.integers(len(cells), size=2)])
-        start, goal = (np.array(field.origin_xy_m) + spacing * np.array(cell[::-1]) for cell in (one, other))
-        if not APART_M[0] <= math.hypot(*(goal - start)) <= APART_M[1] or narrow[one] != narrow[other]:
+    for number in rng.permutation(len(cells))[:STARTS]:
+        one = tuple(cells[number])
+        away_m = spacing * np.hypot(*(cells - one).T)
+        joined = narrow[cells[:, 0], cells[:, 1]] == narrow[one]
+        others = cells[joined & (away_m >= APART_M[0]) & (away_m <= APART_M[1])]
+        if not len(others):
             continue
+        other = tuple(others[rng.integers(len(others))])
+        start, goal = (np.array(field.origin_xy_m) + spacing * np.array(cell[::-1]) for cell in (one, other))
         if wide[one] == wide[other]:
             return start, goal
         searched += 1
