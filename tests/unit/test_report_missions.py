@@ -12,7 +12,8 @@ import pytest
 from PIL import Image
 
 from pilotage.core.types import Pose2
-from pilotage.experiments.mission import load_mission
+from pilotage.experiments import leavings, pictures
+from pilotage.experiments.mission import load_mission, mission_of
 from pilotage.experiments.run import run_mission
 from pilotage.maps.occupancy_grid import UNKNOWN, OccupancyGrid
 from pilotage.records.run_data import read_run, read_team
@@ -115,6 +116,43 @@ def test_a_run_on_a_grid(in_a_room: Path) -> None:
     assert raster.cells.shape == classes.shape
     assert raster.cells[-1].tolist() == classes[0].tolist()
     assert not [line for line in scene.lines if line.name == "walls"]
+
+
+def test_a_floor_of_cells_has_a_floors_page_however_large_it_is(
+    in_a_room: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Grids of more than four million cells, and paths over cells, had the page of terrain."""
+    name = str(tmp_path / "room.yaml")
+    ros_map(tmp_path)
+    values = {
+        "mission": "over-cells",
+        "world": {
+            "map": name,
+            "start": {"x_m": 1.0, "y_m": 1.0, "theta_rad": 0.0},
+            "goal": {"x_m": 4.5, "y_m": 3.0},
+        },
+        "robot": {"footprint": {"radius_m": 0.2}, "motion": "differential-drive", "sensors": {}},
+        "task": "plan",
+        "stack": {"navigator": {"name": "curve", "spline": None}, "planner": "theta-star"},
+        "run": {"dt_s": 0.1, "time_limit_s": 20, "seed": 1},
+    }
+    planned = run_mission(mission_of(values), out=tmp_path / "runs")
+    assert planned.metrics["success"] is True
+    assert "hazard_fraction" not in planned.metrics
+    run_dir = planned.run_dir
+    assert run_dir is not None
+    page = checked_page(run_dir, "map", "metrics")
+    assert "hazard" not in page
+    monkeypatch.setattr(pictures, "MOST_GRID_CELLS", 1000)
+    monkeypatch.setattr(leavings, "MOST_CELLS", 2000)
+    large = run_mission(load_mission(str(in_a_room / "mission.yaml")), out=tmp_path / "large").run_dir
+    assert large is not None
+    run = read_run(large)
+    assert run.terrain is None
+    assert run.grid is not None
+    assert (run.grid.cells.shape, run.grid.resolution_m) == ((40, 50), 0.2)
+    assert not len(run.world.segments_m)
+    assert 'class="layer-grid"' in checked_page(large, "replay", *DRIVEN)
 
 
 def test_the_map_that_an_explorer_made_is_drawn(tmp_path: Path) -> None:
