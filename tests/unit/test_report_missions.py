@@ -12,7 +12,9 @@ import pytest
 from PIL import Image
 
 from pilotage.core.types import Pose2
+from pilotage.evaluation.metrics import METRICS
 from pilotage.experiments import leavings, pictures
+from pilotage.experiments.given import has
 from pilotage.experiments.mission import load_mission, mission_of
 from pilotage.experiments.run import run_mission
 from pilotage.maps.occupancy_grid import UNKNOWN, OccupancyGrid
@@ -143,6 +145,7 @@ def test_a_floor_of_cells_has_a_floors_page_however_large_it_is(
     assert run_dir is not None
     page = checked_page(run_dir, "map", "metrics")
     assert "hazard" not in page
+    assert 'id="timeline"' not in page
     monkeypatch.setattr(pictures, "MOST_GRID_CELLS", 1000)
     monkeypatch.setattr(leavings, "MOST_CELLS", 2000)
     large = run_mission(load_mission(str(in_a_room / "mission.yaml")), out=tmp_path / "large").run_dir
@@ -231,9 +234,17 @@ def test_a_teams_damage_is_told_once_and_each_view_is_as_read_alone(two: Path, t
 
 
 def test_what_is_only_planned(tmp_path: Path) -> None:
-    page = checked_page(run_of(tmp_path, "museum-plan"), "map", "metrics")
+    run_dir = run_of(tmp_path, "museum-plan")
+    page = checked_page(run_dir, "map", "metrics")
     assert 'id="replay"' not in page
     assert "planned path" in page
+    assert "Planned, and nobody drove" in page
+    for of_a_drive in ("duration", "control steps", "Control steps a second", "end (filled)"):
+        assert of_a_drive not in page
+    assert not {"duration_s", "steps", "steps_per_s"} & read_run(run_dir).metrics.keys()
+    assert not {"duration_s", "steps", "steps_per_s"} & METRICS.given_by(
+        "plan", has(load_mission("museum-plan"))
+    )
 
 
 def test_an_explored_sheet(tmp_path: Path) -> None:
