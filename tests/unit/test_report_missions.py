@@ -12,7 +12,10 @@ import pytest
 from PIL import Image
 
 from pilotage.core.types import Pose2
-from pilotage.experiments.mission import load_mission
+from pilotage.evaluation.metrics import METRICS
+from pilotage.experiments import leavings, pictures
+from pilotage.experiments.given import has
+from pilotage.experiments.mission import load_mission, mission_of
 from pilotage.experiments.run import run_mission
 from pilotage.maps.occupancy_grid import UNKNOWN, OccupancyGrid
 from pilotage.records.run_data import read_run, read_team
@@ -117,6 +120,44 @@ def test_a_run_on_a_grid(in_a_room: Path) -> None:
     assert not [line for line in scene.lines if line.name == "walls"]
 
 
+def test_a_floor_of_cells_has_a_floors_page_however_large_it_is(
+    in_a_room: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Grids of more than four million cells, and paths over cells, had the page of terrain."""
+    name = str(tmp_path / "room.yaml")
+    ros_map(tmp_path)
+    values = {
+        "mission": "over-cells",
+        "world": {
+            "map": name,
+            "start": {"x_m": 1.0, "y_m": 1.0, "theta_rad": 0.0},
+            "goal": {"x_m": 4.5, "y_m": 3.0},
+        },
+        "robot": {"footprint": {"radius_m": 0.2}, "motion": "differential-drive", "sensors": {}},
+        "task": "plan",
+        "stack": {"navigator": {"name": "curve", "spline": None}, "planner": "theta-star"},
+        "run": {"dt_s": 0.1, "time_limit_s": 20, "seed": 1},
+    }
+    planned = run_mission(mission_of(values), out=tmp_path / "runs")
+    assert planned.metrics["success"] is True
+    assert "hazard_fraction" not in planned.metrics
+    run_dir = planned.run_dir
+    assert run_dir is not None
+    page = checked_page(run_dir, "map", "metrics")
+    assert "hazard" not in page
+    assert 'id="timeline"' not in page
+    monkeypatch.setattr(pictures, "MOST_GRID_CELLS", 1000)
+    monkeypatch.setattr(leavings, "MOST_CELLS", 2000)
+    large = run_mission(load_mission(str(in_a_room / "mission.yaml")), out=tmp_path / "large").run_dir
+    assert large is not None
+    run = read_run(large)
+    assert run.terrain is None
+    assert run.grid is not None
+    assert (run.grid.cells.shape, run.grid.resolution_m) == ((40, 50), 0.2)
+    assert not len(run.world.segments_m)
+    assert 'class="layer-grid"' in checked_page(large, "replay", *DRIVEN)
+
+
 def test_the_map_that_an_explorer_made_is_drawn(tmp_path: Path) -> None:
     folder = fabricate_run(tmp_path / "run")
     assert '<section id="own-map">' not in page_of(folder)
@@ -193,9 +234,17 @@ def test_a_teams_damage_is_told_once_and_each_view_is_as_read_alone(two: Path, t
 
 
 def test_what_is_only_planned(tmp_path: Path) -> None:
-    page = checked_page(run_of(tmp_path, "museum-plan"), "map", "metrics")
+    run_dir = run_of(tmp_path, "museum-plan")
+    page = checked_page(run_dir, "map", "metrics")
     assert 'id="replay"' not in page
     assert "planned path" in page
+    assert "Planned, and nobody drove" in page
+    for of_a_drive in ("duration", "control steps", "Control steps a second", "end (filled)"):
+        assert of_a_drive not in page
+    assert not {"duration_s", "steps", "steps_per_s"} & read_run(run_dir).metrics.keys()
+    assert not {"duration_s", "steps", "steps_per_s"} & METRICS.given_by(
+        "plan", has(load_mission("museum-plan"))
+    )
 
 
 def test_an_explored_sheet(tmp_path: Path) -> None:

@@ -181,9 +181,10 @@ class TestRuns:
         experiment, run = finished(team(behind, ahead, stack=straight))
         assert run.ending.startswith("collision of fast and slow at (")
         assert [event.text for event in run.events if event.kind == "collision"] == [
-            "fast: the body touched something",
-            "slow: the body touched something",
+            "fast: the body touched robot slow",
+            "slow: the body touched robot fast",
         ]
+        assert ") after " in run.ending, "both are named already"
         metrics = experiment.task.judge(run).metrics
         assert metrics["success"] is False
         assert metrics["collisions"] == 2, "who is run into has touched something, too"

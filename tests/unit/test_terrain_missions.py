@@ -15,7 +15,9 @@ from PIL import Image
 
 from pilotage.cli.main import main
 from pilotage.core.errors import InputError
-from pilotage.experiments.mission import load_mission
+from pilotage.evaluation.metrics import METRICS
+from pilotage.experiments.given import has
+from pilotage.experiments.mission import load_mission, mission_of
 from pilotage.experiments.pictures import shares
 from pilotage.experiments.run import run_mission
 from pilotage.maps.crater_cache import cached_crater_terrain
@@ -285,9 +287,9 @@ def test_a_start_that_inflation_blocks_is_said(wall: Path) -> None:
     assert "start blocked: the start, row 34 and column 27, is blocked" in metrics["reason"]
 
 
-def test_a_hazard_stepped_on_is_told_with_how_wrong_the_robot_was(wall: Path, tmp_path: Path) -> None:
-    """Its GPS is 15 m off, its plan keeps 0.46 m: that it stepped on a hazard was told, and not why."""
-    rover = {
+def by_gps(wall: Path) -> dict[str, Any]:
+    """A rover that plans beside a wall and knows its place to 15 m."""
+    return {
         "mission": "by-gps",
         "world": {
             "map": {"name": "images", "obstacles": str(wall), "resolution_m": 10},
@@ -313,6 +315,29 @@ def test_a_hazard_stepped_on_is_told_with_how_wrong_the_robot_was(wall: Path, tm
         },
         "run": {"dt_s": 0.2, "time_limit_s": 600},
     }
+
+
+def test_lengths_that_are_wrong_on_a_floor_judge_no_rover(wall: Path) -> None:
+    """Its GPS is 15 m off, as its belief says: it was told to have lost track after a second."""
+    values = by_gps(wall)
+    values["run"] |= {"time_limit_s": 20, "settle_s": 0}
+    values["stack"]["initial"] = {"x_var_m2": 100.0, "y_var_m2": 100.0}
+    on_ground = run_mission(mission_of(values), save=False).metrics
+    values["world"]["map"]["open_ground"] = False
+    on_floor = run_mission(mission_of(values), save=False).metrics
+    assert float(str(on_floor["tracked_s"])) < 1.0
+    assert float(str(on_floor["wrong_s"])) > 19.0
+    assert "silently_wrong_s" in on_ground
+    assert not {"tracked_s", "wrong_s"} & on_ground.keys()
+    mission = load_mission("gale-ekf")
+    given = METRICS.given_by(mission.task.name, has(mission))
+    assert not {"tracked_s", "wrong_s"} & given
+    assert "silently_wrong_s" in given
+
+
+def test_a_hazard_stepped_on_is_told_with_how_wrong_the_robot_was(wall: Path, tmp_path: Path) -> None:
+    """Its GPS is 15 m off, its plan keeps 0.46 m: that it stepped on a hazard was told, and not why."""
+    rover = by_gps(wall)
     (tmp_path / "rover.yaml").write_text(yaml.safe_dump(rover))
     runs = [
         run_mission(load_mission(str(tmp_path / "rover.yaml"), (), seed), save=False) for seed in range(4)

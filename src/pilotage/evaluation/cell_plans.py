@@ -59,12 +59,13 @@ def route_metrics(run: FinishedRun, robot: RobotRun, route: CellRoute) -> dict[s
         "rows": grid.rows,
         "columns": grid.columns,
         "resolution_m": grid.resolution_m,
-        "hazard_fraction": float(np.mean(grid.blocked())),
         "start_cell": list(route.start_cell),
         "goal_cell": list(route.goal_cell),
         "planning_time_s": result.planning_time_s,
         "preparation_time_s": route.preparation_s,
     }
+    if chart.open_ground:
+        answer["hazard_fraction"] = float(np.mean(grid.blocked()))
     if result.path is None:
         return answer
     along = route_columns(run, robot, route)

@@ -19,9 +19,9 @@ from pilotage.models.footprint import Footprint
 from pilotage.stack.navigator.goal_config import Mode
 
 WRONG_M, WRONG_RAD = 0.5, 0.1
-"""A pose farther from the truth than this is wrong."""
+"""On a floor, a pose farther from the truth than this is wrong."""
 ASTRAY_M = 1.0
-"""An estimate that was this far off has lost track, though it may come back."""
+"""On a floor, an estimate that was this far off has lost track, though it may come back."""
 MOST_CELLS = 4_000_000
 MOST_SEGMENTS = 400
 """Beyond so many walls no exact shortest path is worked out: its tangent graph grows with their square."""
@@ -64,7 +64,8 @@ def driving_metrics(run: FinishedRun, robot: RobotRun) -> tuple[dict[str, object
     """A robot's metrics whatever its task, and its (N,) NEES.
 
     Errors count after ``run.settle_s``, because the start error is drawn from the initial covariance, and
-    while the robot holds itself for localized: an honest "lost" claims no pose.
+    while the robot holds itself for localized: an honest "lost" claims no pose. Lengths that tell right from
+    wrong are those of floors: on open ground the belief's own ellipse alone does (``silently_wrong_s``).
     """
     trace, config = robot.trace, run.mission.run
     if trace["t_s"].shape[0] == 0:
@@ -87,8 +88,9 @@ def driving_metrics(run: FinishedRun, robot: RobotRun) -> tuple[dict[str, object
         if np.isfinite(met.closest_m):
             metrics["people_closest_m"] = met.closest_m
     metrics |= pose_errors(truth, estimate, counted).metrics()
-    astray = np.flatnonzero(pose_errors(truth, estimate).distance_m > ASTRAY_M)
-    metrics["tracked_s"] = float(trace["t_s"][astray[0] if astray.size else -1])
+    if not run.chart.open_ground:
+        astray = np.flatnonzero(pose_errors(truth, estimate).distance_m > ASTRAY_M)
+        metrics["tracked_s"] = float(trace["t_s"][astray[0] if astray.size else -1])
     # Where nothing is solid, everywhere is open and no place narrow.
     if counted.any() and np.isfinite(trace["clearance_m"]).any():
         metrics |= split_errors(trace, pose_errors(truth, estimate).distance_m, counted)
@@ -167,17 +169,17 @@ def _recovery(
     if "localized" not in trace:
         return {}
     claimed, dt_s = claimed_at(trace), run.mission.run.dt_s
+    on_floor = not run.chart.open_ground
     error = estimate - truth
     wrong = np.hypot(error[:, 0], error[:, 1]) > WRONG_M
     wrong |= np.abs(wrap_array_to_pi(error[:, 2])) > WRONG_RAD
     # One that never says so although it is wrong is the worst case of all.
     wrong_for_good = wrong & (trace["t_s"] > run.mission.run.settle_s)
-    if claimed.all() and known and not wrong_for_good.any():
+    if claimed.all() and known and not (on_floor and wrong_for_good.any()):
         return {}
-    metrics: dict[str, object] = {
-        "lost_s": float(dt_s * (~claimed).sum()),
-        "wrong_s": float(dt_s * (claimed & wrong).sum()),
-    }
+    metrics: dict[str, object] = {"lost_s": float(dt_s * (~claimed).sum())}
+    if on_floor:
+        metrics["wrong_s"] = float(dt_s * (claimed & wrong).sum())
     found = np.flatnonzero(claimed & ~np.concatenate([[known], claimed[:-1]]))
     if found.size:
         since = np.flatnonzero(claimed[: found[-1]])

@@ -57,6 +57,9 @@ def has(mission: Mission) -> frozenset[str]:
     if any(obstacle.kind == "u-trap" for obstacle in mission.world.obstacles):
         found.add("trap")
     source = mission.world.map
+    hazards = isinstance(source, GridMap | ImagesMap) and source.open_ground
+    if not (hazards or isinstance(source, CraterMap | ElevationMap)):
+        found.add("floor")  # what stands stops bodies; else hazards of open ground
     if isinstance(source, str) and source not in shipped_maps():
         found |= {"walls", "ground"}  # a file may hold either
     else:

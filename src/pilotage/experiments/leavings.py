@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -9,13 +10,14 @@ import numpy as np
 from pilotage.core.types import FloatArray
 from pilotage.evaluation.finished import FinishedRun, RobotRun, Verdict
 from pilotage.experiments.loop import Run
-from pilotage.experiments.pictures import is_large, terrain_pictures
+from pilotage.experiments.pictures import is_large, is_terrain, terrain_pictures
 from pilotage.experiments.resolve import resolved_yaml
 from pilotage.maps.cell_map import CellMap
 from pilotage.maps.occupancy_grid import OccupancyGrid
 from pilotage.maps.true_cells import true_map
 from pilotage.maps.world_map import WorldMap
 from pilotage.records.cells import SheetData
+from pilotage.records.grid import MOST_CELLS
 from pilotage.records.patrol import PatrolRecord
 from pilotage.records.plans import Plan, Plans
 from pilotage.records.run_folder import RobotFiles, RunFiles
@@ -108,7 +110,7 @@ def _world(run: FinishedRun) -> World:
 
 
 def drawn_walls(chart: WorldMap) -> FloatArray:
-    """Walls as segments; a grid is drawn as a grid, beyond some size as a picture."""
+    """Walls as segments; of a large grid none: what is drawn of it are its cells, or its picture."""
     if chart.geometry is not None:
         return chart.geometry.segments_m
     if chart.grid is not None and is_large(chart.grid):
@@ -117,10 +119,14 @@ def drawn_walls(chart: WorldMap) -> FloatArray:
 
 
 def drawn_grid(chart: WorldMap) -> OccupancyGrid | None:
-    """The grid that is drawn as one."""
-    if chart.grid is None or chart.geometry is not None or is_large(chart.grid):
+    """The grid that is drawn as one: that of a floor, in blocks where no record holds its cells."""
+    grid = chart.grid
+    if grid is None or chart.geometry is not None or (is_terrain(chart) and is_large(grid)):
         return None
-    return chart.grid
+    step = 1
+    while math.ceil(grid.rows / step) * math.ceil(grid.columns / step) > MOST_CELLS:
+        step += 1
+    return grid.in_blocks(step)
 
 
 def _outline(robot: RobotRun) -> RobotOutline:

@@ -17,14 +17,12 @@ from pilotage.records.scans import Sightings
 from pilotage.records.terrain import TerrainPictures
 
 MOST_GRID_CELLS = 4_000_000
-"""A grid of more cells than this is kept as a picture only."""
 PICTURE_COLUMNS = 900
 """Ground and hazards are kept for the report no wider and no higher than this."""
 
 
 def terrain_pictures(run: FinishedRun, sightings: Sightings) -> TerrainPictures | None:
-    """Ground and hazards, no wider than a report shows them, and the places on them; None where it is no
-    ground: neither with heights or a picture, nor planned over by cells, nor too large to be drawn as it is.
+    """Ground and hazards, no wider than a report shows them, and the places on them; None on a floor.
 
     Parameters
     ----------
@@ -33,10 +31,7 @@ def terrain_pictures(run: FinishedRun, sightings: Sightings) -> TerrainPictures 
     """
     chart = run.chart
     grid = chart.grid
-    if grid is None or chart.geometry is not None:
-        return None
-    planned = any("route" in robot.results for robot in run.robots)
-    if not (planned or chart.elevation is not None or chart.picture is not None or is_large(grid)):
+    if grid is None or not is_terrain(chart):
         return None
     robot = run.robots[0]
     step = max(1, math.ceil(max(grid.rows, grid.columns) / PICTURE_COLUMNS))
@@ -81,8 +76,14 @@ def _seen_ground(chart: WorldMap, step: int) -> NDArray[np.uint8] | None:
     return ElevationModel(coarse, chart.elevation.resolution_m * step).shaded()
 
 
+def is_terrain(chart: WorldMap) -> bool:
+    """Whether a map is one of ground: with heights, a picture of it, or hazards instead of walls."""
+    ground = chart.elevation is not None or chart.picture is not None or chart.open_ground
+    return ground and chart.geometry is None
+
+
 def is_large(grid: OccupancyGrid) -> bool:
-    """Whether a grid is kept as a picture only."""
+    """Whether terrain's hazards are kept as a picture only, and a floor's walls as cells only."""
     return grid.cells.size > MOST_GRID_CELLS
 
 

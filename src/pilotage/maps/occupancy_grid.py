@@ -67,6 +67,21 @@ class OccupancyGrid:
             cells.flags.writeable = False
             object.__setattr__(self, "cells", cells)
 
+    def in_blocks(self, step: int) -> OccupancyGrid:
+        """The same with ``step`` by ``step`` cells made one: occupied where one is, unknown where all are.
+
+        Whole blocks from the origin on: it may reach beyond the grid at the top and the right.
+        """
+        if step <= 1:
+            return self
+        rows, columns = math.ceil(self.rows / step), math.ceil(self.columns / step)
+        padded = np.full((rows * step, columns * step), UNKNOWN, dtype=np.int8)
+        padded[rows * step - self.rows :, : self.columns] = self.cells
+        blocks = padded.reshape(rows, step, columns, step)
+        cells = np.where((blocks == UNKNOWN).all(axis=(1, 3)), np.int8(UNKNOWN), np.int8(FREE))
+        cells[(blocks >= OCCUPIED_FROM).any(axis=(1, 3))] = OCCUPIED
+        return OccupancyGrid(cells, self.resolution_m * step, self.origin)
+
     @staticmethod
     def of(values: ArrayLike, resolution_m: float, origin: Pose2 = CORNER) -> OccupancyGrid:
         """Build from an array: booleans (True is occupied), per cent with -1, or probabilities.

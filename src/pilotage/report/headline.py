@@ -40,7 +40,7 @@ def headline(metrics: Mapping[str, Any]) -> str:
     after = f" after {quantities.duration(duration)}" if duration > 0.0 else ""
     if success is None:
         answer = f"Ended{after}"
-    elif success and duration == 0.0 and math.isfinite(number(metrics.get("planned_length_m"))):
+    elif success and not duration > 0.0 and math.isfinite(number(metrics.get("planned_length_m"))):
         return f"Planned, and nobody drove: {_planned(metrics)}."
     elif success:
         goal = number(metrics.get("goal_error_m"))

@@ -75,7 +75,7 @@ def run_page(run: RunData, damaged: Sequence[str] = (), team: Sequence[RunData] 
     told = run.metrics if several else told_metrics(run)
     sections: list[Section] = []
     # What was only planned has nothing to replay, and nothing is missing.
-    if scene is not None or run.trace.steps:
+    if scene is not None or (run.trace.steps and not run.trace.has("path_x_m")):
         sections.append(replay_section(scene))
     if several:
         sections.append(team_section(run.metrics))

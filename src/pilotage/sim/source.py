@@ -18,6 +18,7 @@ from pilotage.sensors.readings import Reading, Readings
 from pilotage.sensors.sensor import SensorConfig
 from pilotage.sim.bodies.body import APART_M, Body
 from pilotage.sim.bodies.motion import SIMULATED_MOTIONS
+from pilotage.sim.contacts import what_is_touched
 from pilotage.sim.faults.fault import Faults
 from pilotage.sim.people.crowd import Crowd
 from pilotage.sim.people.people import People
@@ -54,8 +55,8 @@ class Simulator:
 
     Parameters
     ----------
-    people
-        Plans of the people besides the robots.
+    people, people_names
+        Plans of the people besides the robots, and what those of each plan are called.
 
     Attributes
     ----------
@@ -71,12 +72,17 @@ class Simulator:
     """
 
     def __init__(
-        self, world: World, robots: Sequence[RobotSpec], dt_s: float, people: Sequence[People] = ()
+        self,
+        world: World,
+        robots: Sequence[RobotSpec],
+        dt_s: float,
+        people: Sequence[People] = (),
+        people_names: Sequence[str] = (),
     ) -> None:
         self._dt_s, self._steps = dt_s, 0
         shapes = [robot.footprint for robot in robots]
         states = np.zeros((len(robots), drive.STATE_SIZE))
-        self.crowd = Crowd(people, shapes, states, dt_s) if people else None
+        self.crowd = Crowd(people, shapes, states, dt_s, people_names) if people else None
         self._crowded = len(robots) > 1 or self.crowd is not None
         self._traffic = Traffic.none()
         if self._crowded:
@@ -95,6 +101,7 @@ class Simulator:
         if self.crowd is not None:
             self.crowd.walk_to(0.0, self._traffic)
             self.crowd.arrive(self._traffic)
+        self._counted = [0] * len(robots)
         self._meeting = (
             states,
             np.concatenate([*(shape.points_m for shape in shapes), np.zeros((0, 2))]),
@@ -140,6 +147,10 @@ class Simulator:
             body.step(command)
         if self._crowded:
             self._meet()
+        for row, body in enumerate(bodies):
+            if body.collisions != self._counted[row]:
+                self._counted[row] = body.collisions
+                body.touched = what_is_touched(body, bodies, self.crowd)
         for observe in self._observe:
             observe()
         said: list[dict[str, Reading]] = [{} for _ in bodies]

@@ -21,6 +21,7 @@ from pilotage.evaluation.guards import guards_of
 from pilotage.evaluation.narrow_passages import cut_off
 from pilotage.evaluation.patrol_visits import VisitLog
 from pilotage.evaluation.stuck_watch import StuckWatch
+from pilotage.evaluation.tasks.contacts import contact_words
 from pilotage.evaluation.tasks.task import TASKS, Attempt, TaskSetting
 from pilotage.evaluation.tasks.team import verdict
 from pilotage.maps.floor import Floor
@@ -114,6 +115,7 @@ class PatrolTask:
         self._guards = GuardLog(len(self._names))
         self._step = 0
         self._contacts = [0] * len(self._names)
+        self._touched: list[dict[str, None]] = [{} for _ in self._names]
         self._stuck = StuckWatch(graph.vertices_xy_m, len(self._names), config.stuck_s, config.visit_m)
         self._series: list[tuple[float, float, float]] = []
 
@@ -141,9 +143,9 @@ class PatrolTask:
         for index, attempt in enumerate(attempts):
             if attempt.body.collisions > self._contacts[index]:
                 self._contacts[index] = attempt.body.collisions
-                self.events.append(
-                    Event(t_s, "collision", f"{self._names[index]}: the body touched something")
-                )
+                self._touched[index] |= dict.fromkeys(attempt.body.touched)
+                words = f"{self._names[index]}: {contact_words(attempt.body.touched)}"
+                self.events.append(Event(t_s, "collision", words))
         return "the patrol's time is over" if t_s >= self._config.duration_s - 1e-6 else None
 
     def _look(self, t_s: float, attempts: Sequence[Attempt]) -> None:
@@ -232,7 +234,8 @@ class PatrolTask:
         driven, nees = driving_metrics(run, robot)
         metrics |= driven
         if robot.collisions:
-            metrics["reason"] = f"touched something, {robot.collisions} times in all"
+            what = f": {' and '.join(self._touched[index])}" if self._touched[index] else ""
+            metrics["reason"] = f"touched something, {robot.collisions} times in all{what}"
         elif index in self._stuck.since_s:
             metrics["reason"] = f"deadlocked from {self._stuck.since_s[index]:.0f} s on"
         elif index in self._dead:

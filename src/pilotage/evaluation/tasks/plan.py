@@ -13,6 +13,9 @@ from pilotage.evaluation.finished import FinishedRun, RobotRun, Verdict
 from pilotage.evaluation.tasks.task import TASKS, Attempt, TaskSetting
 from pilotage.evaluation.tasks.watched import WatchedTask
 
+OF_A_DRIVE = frozenset({"duration_s", "steps", "steps_per_s"})
+"""Of a run's first numbers, those that one without a step has not."""
+
 
 class PlanConfig(Config):
     """Nothing to say: world, robot and planner say it all."""
@@ -39,7 +42,7 @@ class PlanTask(WatchedTask):
         """Length, quality and times of the plan."""
         shortest = shortest_for(run, robot)
         extras = {} if shortest is None else {f"{robot.name}/shortest_path": shortest.points_xy_m}
-        metrics = header(run, robot)
+        metrics = {key: value for key, value in header(run, robot).items() if key not in OF_A_DRIVE}
         route = route_of(robot)
         columns: dict[str, FloatArray] = {}
         if route is None:

@@ -10,10 +10,12 @@ from pilotage.evaluation.driving import header
 from pilotage.evaluation.finished import FinishedRun, RobotRun, Verdict
 from pilotage.evaluation.sheet_metrics import sheet_metrics
 from pilotage.evaluation.sheet_visits import VisitedCells, reachable_cells
+from pilotage.evaluation.tasks.contacts import contact_words
 from pilotage.evaluation.tasks.task import Attempt, TaskSetting, all_ended
 from pilotage.evaluation.tasks.team import verdict
 from pilotage.maps.cell_map import CellMap
 from pilotage.maps.markings import FloorMarkings
+from pilotage.sim.contacts import OBSTACLE, WALL
 
 
 class SheetExploration:
@@ -35,6 +37,7 @@ class SheetExploration:
         self._radii = [footprint.radius_m for footprint in setting.footprints]
         self._visits = [VisitedCells(markings.size_m, markings.cells) for _ in range(count)]
         self._contacts, self._held = [0] * count, [0] * count
+        self._touched: list[dict[str, None]] = [{} for _ in range(count)]
         self._rows = [(0.0, 0.0)] * count
 
     def step(self, t_s: float, attempts: Sequence[Attempt]) -> str | None:
@@ -48,7 +51,9 @@ class SheetExploration:
             self._rows[index] = overhang_m, float(visits.count)
             if body.collisions > self._contacts[index]:
                 self._contacts[index] = body.collisions
-                self.events.append(Event(t_s, "collision", f"{whose}the body ran into a box"))
+                self._touched[index] |= dict.fromkeys(_as_box(what) for what in body.touched)
+                words = contact_words(_as_box(what) for what in body.touched)
+                self.events.append(Event(t_s, "collision", f"{whose}{words}"))
             if not self._markings.holds(pose.x_m, pose.y_m):
                 self.events.append(Event(t_s, "failed", f"{whose}the robot's centre left the sheet"))
                 return "left the sheet"
@@ -83,7 +88,8 @@ class SheetExploration:
         if done and robot.collisions:
             # Done, and yet no success: it says why.
             times = "once" if robot.collisions == 1 else f"{robot.collisions} times"
-            metrics["reason"] = f"{metrics['reason']}; touched a box {times}"
+            what = " and ".join(self._touched[index]) or "a box"
+            metrics["reason"] = f"{metrics['reason']}; touched {what} {times}"
         metrics |= {
             "success": done and robot.collisions == 0,
             "real_time_factor": run.duration_s / run.loop_s,
@@ -106,3 +112,8 @@ class SheetExploration:
             f"{robot.name}/reachable": reachable_cells(self._sheet, self._radii[index]).astype(float),
         }
         return Verdict(metrics, ({},), extras)
+
+
+def _as_box(touched: str) -> str:
+    """What stands on a sheet is a box."""
+    return "a box" if touched in (WALL, OBSTACLE) else touched

@@ -7,6 +7,7 @@ from typing import ClassVar
 
 from pilotage.core.types import Event
 from pilotage.evaluation.finished import FinishedRun, RobotRun, Verdict
+from pilotage.evaluation.tasks.contacts import contact_words
 from pilotage.evaluation.tasks.task import Attempt, all_ended
 from pilotage.evaluation.tasks.team import verdict
 from pilotage.missions.places import GoalConfig
@@ -30,12 +31,16 @@ class WatchedTask:
             return "" if all_ended(attempts) else None
         names = [body.name for body in touched] if len(attempts) > 1 else [""]
         self.events += [
-            Event(t_s, "collision", f"{name}: the body touched something".removeprefix(": "))
-            for name in names
+            Event(t_s, "collision", f"{name}: {contact_words(body.touched)}".removeprefix(": "))
+            for name, body in zip(names, touched, strict=True)
         ]
         whose = f"of {' and '.join(names)} " if len(attempts) > 1 else ""
+        # Two that ran into each other are both named already.
+        told = {f"robot {name}" for name in names}
+        others = dict.fromkeys(what for body in touched for what in body.touched if what not in told)
+        what = f" with {' and '.join(others)}" if others else ""
         pose = touched[0].pose
-        return f"collision {whose}at ({pose.x_m:.2f}, {pose.y_m:.2f}) after {t_s:.1f} s"
+        return f"collision {whose}at ({pose.x_m:.2f}, {pose.y_m:.2f}){what} after {t_s:.1f} s"
 
     def row(self, index: int) -> tuple[float, ...]:  # noqa: ARG002
         """Nothing beyond what every trace has."""

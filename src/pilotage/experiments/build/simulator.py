@@ -37,7 +37,8 @@ def make_simulator(
     robots = [
         _spec(mission, index, sheet, oracles, chart.landmarks.ids) for index, sheet in enumerate(sheets)
     ]
-    return Simulator(world, robots, mission.run.dt_s, _people(mission, world, robots))
+    names = [choice.name for choice in mission.world.people]
+    return Simulator(world, robots, mission.run.dt_s, _people(mission, world, robots), names)
 
 
 def _people(mission: Mission, world: World, robots: Sequence[RobotSpec]) -> list[People]:

@@ -161,7 +161,9 @@ def meet_people(
                 between[r, p] = APART
                 continue
             anew = between[r, p] == APART and not appears
-            drove = state[BLOCKER] > 0.0 or (anew and closing > CLOSES_M_S * BEFORE * dt)
+            # Who walked into it is not solid to it, and so not who stopped it.
+            stopped = state[BLOCKER] > 0.0 and between[r, p] != WALKED_INTO
+            drove = stopped or (anew and closing > CLOSES_M_S * BEFORE * dt)
             if drove and between[r, p] != HIT:
                 between[r, p] = HIT
                 hit = True

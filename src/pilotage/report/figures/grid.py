@@ -11,7 +11,7 @@ from matplotlib.colors import to_rgba
 from matplotlib.transforms import Affine2D
 
 from pilotage.core.types import FloatArray, IntArray
-from pilotage.maps.occupancy_grid import OCCUPIED_FROM, UNKNOWN, OccupancyGrid
+from pilotage.maps.occupancy_grid import UNKNOWN, OccupancyGrid
 
 OCCUPIED_COLOUR, UNKNOWN_COLOUR = "#2f3b47", "#d3d9df"
 FREE_CELL, UNKNOWN_CELL, OCCUPIED_CELL = 0, 1, 2
@@ -27,15 +27,10 @@ def cell_classes(grid: OccupancyGrid, most: int = MOST_PIXELS) -> tuple[IntArray
     Blocks of cells of a grid of more than ``most`` along a side become one: occupied where one of them is,
     unknown where all are.
     """
-    step = max(1, math.ceil(max(grid.rows, grid.columns) / most))
-    rows, columns = math.ceil(grid.rows / step), math.ceil(grid.columns / step)
-    # Whole blocks: rows are added at the top and columns at the right, away from the origin.
-    padded = np.full((rows * step, columns * step), UNKNOWN, dtype=np.int8)
-    padded[rows * step - grid.rows :, : grid.columns] = grid.cells
-    blocks = padded.reshape(rows, step, columns, step)
-    classes = np.where((blocks == UNKNOWN).all(axis=(1, 3)), UNKNOWN_CELL, FREE_CELL)
-    classes[(blocks >= OCCUPIED_FROM).any(axis=(1, 3))] = OCCUPIED_CELL
-    return classes, np.array([columns, rows]) * step * grid.resolution_m
+    coarse = grid.in_blocks(math.ceil(max(grid.rows, grid.columns) / most))
+    classes = np.where(coarse.cells == UNKNOWN, UNKNOWN_CELL, FREE_CELL)
+    classes[coarse.blocked(unknown_is_free=True)] = OCCUPIED_CELL
+    return classes, np.array([coarse.columns, coarse.rows]) * coarse.resolution_m
 
 
 def has_unknown(grid: OccupancyGrid | None) -> bool:

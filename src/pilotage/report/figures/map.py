@@ -148,15 +148,17 @@ def _caption(run: RunData, limits: Limits, magnification: int) -> str:
     ends = run.world.segments_m.reshape(-1, 2)
     if bool(((ends < limits[:2]) | (ends > limits[2:])).any()):
         parts.append("Only the part of the floor around the run is shown.")
+    # Where nobody drove there is no end.
+    end = run.trace.has("true_x_m")
     if len(outline.polygon_m):
         long, wide = (float(side) for side in np.ptp(outline.polygon_m, axis=0))
         parts.append(
-            "The robot's outline at start (open), end (filled) and goal (dashed) is to scale, "
+            f"The robot's outline at start (open){', end (filled)' * end} and goal (dashed) is to scale, "
             f"{quantities.length(long)} long and {quantities.length(wide)} wide."
         )
     elif radius is not None:
         parts.append(
-            "The robot's disc at start (open) and end (filled) is to scale, "
+            f"The robot's disc at start (open){' and end (filled)' * end} is to scale, "
             f"{quantities.length(radius)} in radius."
         )
     if magnification == 1:

@@ -39,7 +39,7 @@ def timeline_figure(run: RunData) -> Illustration:
     """Draw the numbered events, the distance to go and a strip a mode over time."""
     trace, t_s = run.trace, run.trace.t_s
     to_go_known = trace.has("distance_to_go_m")
-    if not trace.steps:
+    if not trace.steps or trace.has("path_x_m"):
         return Illustration(SLUG, TITLE, "", "The run ended before its first step.")
     rows = _badge_rows(run)
     used = [(mode, stretches) for mode in MODES if len(stretches := mode_spans(trace, mode))]

@@ -27,6 +27,9 @@ class Body:
         The robot's.
     stopped
         Whether it stands whatever it is commanded, because something of it broke.
+    touched
+        What it ran into when last a collision was counted, or what into it: a few words each; who runs the
+        world writes them.
     table, row, state
         (R, drive.STATE_SIZE) what the kernels keep of all bodies, and this one's row of it; see
         ``kernels.bodies.drive``.
@@ -51,6 +54,7 @@ class Body:
     ) -> None:
         self.name, self.footprint, self.motion, self.world = name, footprint, motion, world
         self.stopped = False
+        self.touched: tuple[str, ...] = ()
         self.table, self.row, self.owns = table, row, owns
         self.state, self.own = table[row], owns[row]
         own = self.own

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -43,14 +44,28 @@ class Crowd:
         In the mission's order.
     states
         (R, drive.STATE_SIZE) of the robots' bodies, which the simulator keeps up to date.
+    plan_names
+        What the people of each plan are called; ``person`` where none are given.
+
+    Attributes
+    ----------
+    names
+        Of everybody, in order: the plan's name, numbered from 1 where several are called so.
     """
 
     def __init__(
-        self, plans: Sequence[People], footprints: Sequence[Footprint], states: FloatArray, dt_s: float
+        self,
+        plans: Sequence[People],
+        footprints: Sequence[Footprint],
+        states: FloatArray,
+        dt_s: float,
+        plan_names: Sequence[str] = (),
     ) -> None:
         self._plans, self._states, self._dt_s = tuple(plans), states, dt_s
         self.radius_m: FloatArray = np.concatenate([np.zeros(0), *(plan.radius_m for plan in plans)])
         self._first = np.cumsum([0, *(len(plan.radius_m) for plan in plans)])
+        called = plan_names or ["person"] * len(plans)
+        self.names = _names([n for n, plan in zip(called, plans, strict=True) for _ in plan.radius_m])
         count, robots = len(self.radius_m), len(footprints)
         self.places_m: FloatArray = np.full((count, 2), np.nan)
         self._before, self._robots_before = self.places_m.copy(), states[:, :3].copy()
@@ -103,6 +118,10 @@ class Crowd:
             self._tally,
         )
 
+    def driven_into(self, robot: int) -> tuple[str, ...]:
+        """Whom a robot drove into and is not yet apart from, by name."""
+        return tuple(self.names[k] for k in np.flatnonzero(self._between[robot] == encounters.HIT))
+
     def encounters(self, robot: int) -> Encounters:
         """What a robot's meetings came to so far."""
         row = self._tally[robot]
@@ -112,3 +131,13 @@ class Crowd:
             float(row[encounters.CLOSEST]),
             float(row[encounters.NEAR] / max(row[encounters.STEPS], 1.0)),
         )
+
+
+def _names(called: Sequence[str]) -> tuple[str, ...]:
+    """Each with a number of its own, but who alone is called so."""
+    so_far: Counter[str] = Counter()
+    names = []
+    for name in called:
+        so_far[name] += 1
+        names.append(name if called.count(name) == 1 else f"{name} {so_far[name]}")
+    return tuple(names)
