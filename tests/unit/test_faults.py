@@ -185,6 +185,19 @@ class TestWatching:
         assert trace["localized"][after].all()
         assert off[after].max() < 0.1
 
+    def test_what_commands_do_not_log_begins_anew_where_landmarks_found_the_robot(self) -> None:
+        """It was lost for half of twenty seconds without odometry, and three metres off at their end."""
+        more = (
+            "stack.localizer={name: ekf-gauss-markov}",
+            "robot.faults=[{name: gap, sensor: odometry, from_s: 15, length_s: 20}]",
+            "run.time_limit_s=37",
+        )
+        trace = run_loop(build(load_mission("museum-1", more, 0))).finished.robots[0].trace
+        silent = (trace["t_s"] > 15.0) & (trace["t_s"] < 36.0)
+        off = np.hypot(trace["est_x_m"] - trace["true_x_m"], trace["est_y_m"] - trace["true_y_m"])
+        assert trace["localized"][silent].mean() > 0.9
+        assert off[silent].max() < 1.5
+
     def test_an_increment_beyond_the_top_speed_is_as_uncertain_as_it_is_long(self) -> None:
         robot = told_of().robot
         watch = OdometryWatch(robot, WheelOdometryConfig(rate_hz=10.0))

@@ -33,7 +33,7 @@ from pilotage.stack.localization.landmark_filter import (
 )
 from pilotage.stack.localization.localizer import LOCALIZERS, require_initial_pose
 from pilotage.stack.localization.odometry_prediction import OdometryPrediction
-from pilotage.stack.localization.odometry_watch import MOST_HEADING_VAR, OdometryWatch
+from pilotage.stack.localization.odometry_watch import MOST_HEADING_VAR, OdometryWatch, is_as_sure
 from pilotage.stack.localization.recent_sightings import RecentSightings
 from pilotage.stack.localization.self_check import NOISE_SHARE, SelfCheck
 
@@ -203,8 +203,13 @@ class EkfGaussMarkovLocalizer:
     def _wonder(self, dt_s: float) -> None:
         """Nothing is known to act: the robot may stand, or go on at a speed that stays unknown.
 
-        Its place then has the variance (speed t)^2, which grows by speed^2 (2 t + dt) dt.
+        Its place then has the variance (speed t)^2, which grows by speed^2 (2 t + dt) dt. What it did until
+        its landmarks found it last is known: the time begins anew there.
         """
+        if self._unlogged_s > 0.0 and is_as_sure(
+            self.belief, self._unlogged[0], self._unlogged[1], self._dt_s
+        ):
+            self._unlogged_s = 0.0
         self._predict(0.0, 0.0, dt_s)
         self._recent.forget()
         growth = (2.0 * self._unlogged_s + dt_s) * dt_s

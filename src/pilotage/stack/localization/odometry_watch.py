@@ -56,7 +56,7 @@ class OdometryWatch:
         if odometry is None:
             if t_s - self._last_s < self._period_s - 0.5 * self._dt_s:
                 return 0.0, 0.0
-            if self._widened_s > 0.0 and self._is_sure(belief):
+            if self._widened_s > 0.0 and is_as_sure(belief, self._top_m_s, self._turn_rad_s, self._dt_s):
                 self._from_s, self._widened_s = before_s, 0.0
             since_s = t_s - self._from_s
             square = since_s**2 - self._widened_s**2
@@ -72,15 +72,6 @@ class OdometryWatch:
         place = odometry.distance_m**2 + odometry.lateral_m**2
         return max(place, (self._top_m_s * since_s) ** 2), odometry.angle_rad**2
 
-    def _is_sure(self, belief: Belief) -> bool:
-        """Whether a belief is as sure as one silent step would leave it, or surer."""
-        (xx, _, _), (_, yy, _), (_, _, heading) = belief.cov.tolist()
-        return (
-            belief.status is BeliefStatus.LOCALIZED
-            and max(xx, yy) <= (self._top_m_s * self._dt_s) ** 2
-            and heading <= (self._turn_rad_s * self._dt_s) ** 2
-        )
-
     def widen(self, cov: FloatArray, t_s: float, odometry: OdometryIncrement | None, belief: Belief) -> bool:
         """Add a step's variances to the covariance of a pose, which comes first in ``cov`` (N, N); returns
         whether there were any."""
@@ -89,6 +80,16 @@ class OdometryWatch:
             return False
         add_variances(cov, place, heading)
         return True
+
+
+def is_as_sure(belief: Belief, speed_m_s: float, turn_rate_rad_s: float, dt_s: float) -> bool:
+    """Whether a belief is as sure as one step at speeds that are not known would leave it, or surer."""
+    (xx, _, _), (_, yy, _), (_, _, heading) = belief.cov.tolist()
+    return (
+        belief.status is BeliefStatus.LOCALIZED
+        and max(xx, yy) <= (speed_m_s * dt_s) ** 2
+        and heading <= (turn_rate_rad_s * dt_s) ** 2
+    )
 
 
 def add_variances(cov: FloatArray, place: float, heading: float) -> None:
