@@ -6,6 +6,7 @@ import math
 
 from pilotage.core.types import STOP, FloatArray, Twist
 from pilotage.sensors.readings import Readings
+from pilotage.stack.control.arc_stop import ArcStop
 from pilotage.stack.control.scan_guard import NOTHING, ScanGuard
 from pilotage.stack.knowledge import RobotKnowledge
 
@@ -16,8 +17,9 @@ AGAIN_S = 1.0
 class LastWord:
     """Says whether a command may leave; what to do where it may not is the navigator's own business.
 
-    To be told of every step's readings, and asked about every command that is no stop: it reckons with what
-    it allowed last as what the robot was told to do.
+    To be told of every step's readings, asked about every command that is no stop, and handed what leaves in
+    the end, which it brakes along the arc where that is a stop; who hands it nothing drives what it allowed
+    last, by its reckoning.
 
     Attributes
     ----------
@@ -26,7 +28,7 @@ class LastWord:
     """
 
     def __init__(self, robot: RobotKnowledge) -> None:
-        self._guard = ScanGuard(robot)
+        self._guard, self._arc_stop = ScanGuard(robot), ArcStop(robot)
         self._left: Twist | None = None
         self._t_s = self._refused_s = 0.0
         self._since_s = math.inf
@@ -38,10 +40,18 @@ class LastWord:
             self._guard.sent(self._left)
         self._left, self._t_s = STOP, readings.t_s
         self._guard.take_in(readings)
+        self._arc_stop.take_in(readings)
 
     def allows(self, command: Twist) -> bool:
-        """Whether it may leave."""
+        """Whether it may leave: there is room for it, and for what the robot does next that is told so.
+
+        One with weak brakes that is told to turn, or to go back, rolls on for a while.
+        """
         touched_m = self._guard.touched_m(command)
+        if not len(touched_m):
+            rolls_on = self._arc_stop.follows(command)
+            if not _is_part(rolls_on, command):
+                touched_m = self._guard.touched_m(rolls_on)
         if not len(touched_m):
             self._left = command
             return True
@@ -50,6 +60,11 @@ class LastWord:
             self._since_s = self._t_s
         self._since_s, self._refused_s = min(self._since_s, self._t_s), self._t_s
         return False
+
+    def leaving(self, command: Twist) -> Twist:
+        """What leaves in this step for a command: itself, or of a stop the braking along the arc."""
+        self._left = self._arc_stop.leaving(command)
+        return self._left
 
     @property
     def why(self) -> str:
@@ -61,3 +76,11 @@ class LastWord:
         """For how long it has refused now, again and again; 0 where it did not just now."""
         held = self._t_s - self._refused_s <= AGAIN_S
         return max(self._t_s - self._since_s, 0.0) if held else 0.0
+
+
+def _is_part(one: Twist, whole: Twist) -> bool:
+    """Whether one is the other but slower, along the same arc."""
+    if one == whole:
+        return True
+    share = one.v_m_s / whole.v_m_s if whole.v_m_s != 0.0 else -1.0
+    return 0.0 <= share <= 1.0 and one == Twist(one.v_m_s, share * whole.w_rad_s, share * whole.lateral_m_s)

@@ -12,19 +12,25 @@ EVERY_STEP = 0.999
 """An odometry that tells at every step, but for rounding."""
 
 
+def odometry_of_every_step(robot: RobotKnowledge) -> tuple[str, WheelOdometryConfig] | None:
+    """The name and data sheet of an odometry that tells at every step; None where there is none."""
+    return next(
+        (
+            (name, sheet)
+            for name, sheet in robot.sensors_of(WheelOdometryConfig).items()
+            if sheet.rate_hz * robot.dt_s >= EVERY_STEP
+        ),
+        None,
+    )
+
+
 class OwnMotion:
     """Says what was driven in each step: by the odometry where one tells at every step, else as commanded."""
 
     def __init__(self, robot: RobotKnowledge) -> None:
         self._commanded = CommandedMotion(robot.motion, robot.dt_s)
-        self._odometry = next(
-            (
-                name
-                for name, sheet in robot.sensors_of(WheelOdometryConfig).items()
-                if sheet.rate_hz * robot.dt_s >= EVERY_STEP
-            ),
-            None,
-        )
+        found = odometry_of_every_step(robot)
+        self._odometry = None if found is None else found[0]
 
     def sent(self, t_s: float, command: Command) -> None:
         """A command left."""

@@ -226,9 +226,12 @@ class CurveNavigator:
         """Localize, move the reference on where the lasers leave room for it, and follow it."""
         assert self._localizer is not None
         pose = self._localizer.step(readings).pose
+        self._last_word.take_in(readings)
+        return self._last_word.leaving(self._command(readings, pose))
+
+    def _command(self, readings: Readings, pose: Pose2) -> Twist:
         if self._status is not StackStatus.RUNNING:
             return STOP
-        self._last_word.take_in(readings)
         at_end = self._index >= len(self._references) - 1
         command = self._at_end(readings.t_s, pose) if at_end else self._along(pose)
         if self._last_word.allows(command):

@@ -137,9 +137,12 @@ class LocalNavigator(LocalizingNavigator):
     def step(self, readings: Readings) -> Twist:
         """Localize, move the odometry's pose on, and ask the controller where there is a scan."""
         belief = self._localizer.step(readings)
-        pose = belief.pose
         self._drive.move(readings)
         self._last_word.take_in(readings)
+        return self._last_word.leaving(self._command(readings, belief))
+
+    def _command(self, readings: Readings, belief: Belief) -> Twist:
+        pose = belief.pose
         away_m = math.hypot(self._goal_xy_m[0] - pose.x_m, self._goal_xy_m[1] - pose.y_m)
         if self._is_lost(readings.t_s, belief):
             # Where the goal is nobody knows: a belief that was given up lies in the middle of the map.

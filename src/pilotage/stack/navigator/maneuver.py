@@ -241,6 +241,9 @@ class ManeuverNavigator(LocalizingNavigator):
         """Localize, move the reference on, and follow it."""
         belief = self._localizer.step(readings)
         self._last_word.take_in(readings)
+        return self._last_word.leaving(self._command(readings, belief))
+
+    def _command(self, readings: Readings, belief: Belief) -> Twist:
         if self._status is not StackStatus.RUNNING:
             return STOP
         if belief.status is BeliefStatus.LOST:

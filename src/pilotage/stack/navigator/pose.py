@@ -74,6 +74,9 @@ class PoseNavigator(LocalizingNavigator):
         to_go_m = self._law.distance_m(pose.x_m, pose.y_m)
         self._channel.tell(to_go_m)
         self._last_word.take_in(readings)
+        return self._last_word.leaving(self._command(readings, pose, to_go_m))
+
+    def _command(self, readings: Readings, pose: Pose2, to_go_m: float) -> Twist:
         if self._status is not StackStatus.RUNNING:
             return STOP
         self._is_there |= to_go_m <= self._tolerance_m

@@ -191,6 +191,10 @@ class Context:
         self.own_map.show(pose.placed(self._last_word.shown_m))
         return True
 
+    def leaving(self, command: Twist) -> Twist:
+        """What leaves for a step's command: a stop brakes along the arc that the robot is on."""
+        return self._last_word.leaving(command)
+
     @property
     def among_people(self) -> bool:
         """Whether somebody walked about a moment ago: what blocks the path may be gone soon."""

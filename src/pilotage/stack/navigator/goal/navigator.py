@@ -106,7 +106,7 @@ class GoalNavigator:
         self._state, command = state.step(readings, belief)
         self._unseen.look(readings.t_s)
         self._tell()
-        return command
+        return self._context.leaving(command)
 
     def _tell(self) -> None:
         context = self._context

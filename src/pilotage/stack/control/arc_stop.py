@@ -1,0 +1,104 @@
+"""What a robot does next of what it is told, and how it is stopped: along the arc that it is on."""
+
+from __future__ import annotations
+
+import math
+
+from pilotage.core.types import STOP, Twist
+from pilotage.models.motion.rates import approach
+from pilotage.models.odometry import increment_variances
+from pilotage.sensors.readings import OdometryIncrement, Readings
+from pilotage.stack.control.own_motion import odometry_of_every_step
+from pilotage.stack.knowledge import RobotKnowledge
+
+STDS = 4.0
+"""Of an increment: so much off it hardly ever tells."""
+STEPS = 2.0
+"""So many steps of speeding up or braking lie between what it is told and what its odometry told, at most."""
+
+
+class ArcStop:
+    """Reckons how a robot rolls by what it was told, and says what it is told that shall stop.
+
+    Who checks a command checks the stop after it along its arc. Told (0, 0) a robot whose brakes are weaker
+    than its steering drops its turn at once and rolls straight on, off that arc. So it is told each step's
+    speed of the braking, and turn rate and lateral speed in proportion: a twist times a number has the same
+    radius. It reckons that rates follow what it was told as fast as its data sheet lets them, which is what
+    they will do when a command acts, ``delay_s`` later; where its odometry tells that they do not, as against
+    a wall, those that it tells. Robots that steer wheels, which stay where they are in a stop, and those that
+    stop within a step are told (0, 0).
+    """
+
+    def __init__(self, robot: RobotKnowledge) -> None:
+        motion = robot.motion
+        self._motion, self._dt_s = motion, robot.dt_s
+        self._slows_m_s = motion.braking_m_s2 * robot.dt_s
+        self._rolls = self._slows_m_s < motion.top_speed_m_s
+        self._steers = motion.least_turning_radius_m > 0.0
+        self._odometry = odometry_of_every_step(robot)
+        self._going, self._per_m = STOP, 0.0
+
+    def take_in(self, readings: Readings) -> None:
+        """Begin a step with its readings."""
+        if not self._rolls or self._odometry is None:
+            return
+        name, sheet = self._odometry
+        told, going, dt_s = readings.by_sensor.get(name), self._going, self._dt_s
+        if not isinstance(told, OdometryIncrement):
+            return
+        drove_m = math.hypot(told.distance_m, told.lateral_m)
+        distance_var, _ = increment_variances(
+            drove_m,
+            told.angle_rad,
+            sheet.distance_var_m2_per_m,
+            sheet.distance_var_m2_per_rad,
+            sheet.angle_var_rad2_per_rad,
+            sheet.angle_var_rad2_per_m,
+        )
+        may_differ_m_s = (STEPS + self._motion.delay_s / dt_s) * self._slows_m_s
+        off_m_s = math.hypot(told.distance_m / dt_s - going.v_m_s, told.lateral_m / dt_s - going.lateral_m_s)
+        if off_m_s > may_differ_m_s + STDS * math.sqrt(distance_var) / dt_s:
+            self._going = Twist(told.distance_m / dt_s, told.angle_rad / dt_s, told.lateral_m / dt_s)
+
+    def leaving(self, command: Twist) -> Twist:
+        """What leaves in this step: the command, or of a stop what brakes along the arc."""
+        if not self._rolls:
+            return command
+        if command == STOP and not self._steers:
+            command = self._braked()
+        if self._steers and command.v_m_s != 0.0:
+            self._per_m = self._bends(command)
+        self._going = self.follows(command)
+        return command
+
+    def follows(self, command: Twist) -> Twist:
+        """What it does in the next step, told a command."""
+        if not self._rolls:
+            return command
+        going, motion, slows = self._going, self._motion, self._slows_m_s
+        v_m_s = approach(going.v_m_s, command.v_m_s, motion.top_speed_m_s, slows)
+        if self._steers:
+            return Twist(v_m_s, v_m_s * (self._bends(command) if command.v_m_s != 0.0 else self._per_m))
+        most = motion.top_turn_rate_rad_s
+        turns = motion.turn_acceleration_rad_s2 * self._dt_s
+        return Twist(
+            v_m_s,
+            approach(going.w_rad_s, command.w_rad_s, most, turns),
+            approach(going.lateral_m_s, command.lateral_m_s, motion.top_lateral_m_s, slows),
+        )
+
+    def _bends(self, command: Twist) -> float:
+        """The curvature of a car's path in the next step."""
+        motion = self._motion
+        tightest = 1.0 / motion.least_turning_radius_m
+        change = motion.curvature_rate_per_m_s * self._dt_s
+        return approach(self._per_m, command.w_rad_s / command.v_m_s, tightest, change)
+
+    def _braked(self) -> Twist:
+        going = self._going
+        speed_m_s = math.hypot(going.v_m_s, going.lateral_m_s)
+        slower_m_s = speed_m_s - self._slows_m_s
+        if slower_m_s <= 0.0:
+            return STOP
+        share = slower_m_s / speed_m_s
+        return Twist(share * going.v_m_s, share * going.w_rad_s, share * going.lateral_m_s)
