@@ -39,6 +39,13 @@ NO_DISCS = np.zeros((0, 3))
 FAR = WorldMap("far", (-50.0, -50.0, 50.0, 50.0))
 
 
+def left(arc_stop: ArcStop, command: Twist) -> Twist:
+    """What leaves for a command, of which it is told."""
+    leaves = arc_stop.leaving(command)
+    arc_stop.sent(leaves)
+    return leaves
+
+
 def stopped(motion: MotionConfig, command: Twist, odometry: bool = True, by_arc: bool = True) -> FloatArray:
     """(N, 3) poses from the stop of a robot that drove a command for long, until it stands."""
     sensors = ODOMETRY if odometry else {}
@@ -48,7 +55,7 @@ def stopped(motion: MotionConfig, command: Twist, odometry: bool = True, by_arc:
     for step in range(200):
         arc_stop.take_in(readings)
         told = command if step < 60 else STOP
-        readings = sim.step([arc_stop.leaving(told) if by_arc else told])[0]
+        readings = sim.step([left(arc_stop, told) if by_arc else told])[0]
         if step >= 60:
             poses.append(sim.bodies[0].pose.as_array())
     assert np.array_equal(poses[-1], poses[-2]), "it stands"
@@ -97,15 +104,15 @@ def test_sideways_it_keeps_its_direction() -> None:
 def test_who_leaves_no_arc_is_told_to_stop(motion: MotionConfig) -> None:
     arc_stop = ArcStop(replace(told_of().robot, motion=motion, sensors=ODOMETRY, dt_s=DT_S))
     for _ in range(20):
-        arc_stop.leaving(Twist(0.5, 0.5))
-    assert arc_stop.leaving(STOP) == STOP
+        left(arc_stop, Twist(0.5, 0.5))
+    assert left(arc_stop, STOP) == STOP
 
 
 def test_a_turn_on_the_spot_stops_at_once() -> None:
     arc_stop = ArcStop(replace(told_of().robot, motion=DifferentialDriveConfig(**WEAK), dt_s=DT_S))
     for _ in range(20):
-        arc_stop.leaving(Twist(0.0, 1.0))
-    assert arc_stop.leaving(STOP) == STOP
+        left(arc_stop, Twist(0.0, 1.0))
+    assert left(arc_stop, STOP) == STOP
 
 
 def test_one_that_stands_against_something_is_soon_told_to_stand() -> None:
@@ -115,11 +122,11 @@ def test_one_that_stands_against_something_is_soon_told_to_stand() -> None:
     stands = {"odometry": OdometryIncrement(0.0, 0.0)}
     for step in range(60):
         arc_stop.take_in(Readings(0.1 * step, stands))
-        arc_stop.leaving(Twist(0.8, 0.8))
+        left(arc_stop, Twist(0.8, 0.8))
     told = []
     for step in range(60, 63):
         arc_stop.take_in(Readings(0.1 * step, stands))
-        told.append(arc_stop.leaving(STOP))
+        told.append(left(arc_stop, STOP))
     assert told[0].v_m_s < 0.1
     assert told[2] == STOP
 

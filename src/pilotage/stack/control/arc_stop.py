@@ -35,6 +35,9 @@ class ArcStop:
         self._slows_m_s = motion.braking_m_s2 * robot.dt_s
         self._rolls = self._slows_m_s < motion.top_speed_m_s
         self._steers = motion.least_turning_radius_m > 0.0
+        self._turns_rad_s = motion.turn_acceleration_rad_s2 * robot.dt_s
+        self._top_m_s, self._top_rad_s = motion.top_speed_m_s, motion.top_turn_rate_rad_s
+        self._may_differ_m_s = (STEPS + motion.delay_s / robot.dt_s) * self._slows_m_s
         self._odometry = odometry_of_every_step(robot)
         self._going, self._per_m = STOP, 0.0
 
@@ -46,45 +49,59 @@ class ArcStop:
         told, going, dt_s = readings.by_sensor.get(name), self._going, self._dt_s
         if not isinstance(told, OdometryIncrement):
             return
-        drove_m = math.hypot(told.distance_m, told.lateral_m)
+        along_m_s = told.distance_m / dt_s - going.v_m_s
+        across_m_s = told.lateral_m / dt_s - going.lateral_m_s
+        # Nearly always so, and quickly told.
+        if abs(along_m_s) + abs(across_m_s) <= self._may_differ_m_s:
+            return
         distance_var, _ = increment_variances(
-            drove_m,
+            math.hypot(told.distance_m, told.lateral_m),
             told.angle_rad,
             sheet.distance_var_m2_per_m,
             sheet.distance_var_m2_per_rad,
             sheet.angle_var_rad2_per_rad,
             sheet.angle_var_rad2_per_m,
         )
-        may_differ_m_s = (STEPS + self._motion.delay_s / dt_s) * self._slows_m_s
-        off_m_s = math.hypot(told.distance_m / dt_s - going.v_m_s, told.lateral_m / dt_s - going.lateral_m_s)
-        if off_m_s > may_differ_m_s + STDS * math.sqrt(distance_var) / dt_s:
+        noise_m_s = STDS * math.sqrt(distance_var) / dt_s
+        if math.hypot(along_m_s, across_m_s) > self._may_differ_m_s + noise_m_s:
             self._going = Twist(told.distance_m / dt_s, told.angle_rad / dt_s, told.lateral_m / dt_s)
 
-    def leaving(self, command: Twist) -> Twist:
-        """What leaves in this step: the command, or of a stop what brakes along the arc."""
+    def sent(self, command: Twist) -> None:
+        """A command left."""
         if not self._rolls:
-            return command
-        if command == STOP and not self._steers:
-            command = self._braked()
+            return
         if self._steers and command.v_m_s != 0.0:
             self._per_m = self._bends(command)
         self._going = self.follows(command)
-        return command
+
+    def leaving(self, command: Twist) -> Twist:
+        """What is to leave for a command: itself, or of a stop what brakes along the arc."""
+        return self._braked() if command == STOP and self._rolls and not self._steers else command
 
     def follows(self, command: Twist) -> Twist:
-        """What it does in the next step, told a command."""
-        if not self._rolls:
+        """What it does in the next step, told a command: the command itself where it gets there within it."""
+        going, slows = self._going, self._slows_m_s
+        if not self._rolls or (not self._steers and self._reaches(command)):
             return command
-        going, motion, slows = self._going, self._motion, self._slows_m_s
-        v_m_s = approach(going.v_m_s, command.v_m_s, motion.top_speed_m_s, slows)
+        motion = self._motion
+        v_m_s = approach(going.v_m_s, command.v_m_s, self._top_m_s, slows)
         if self._steers:
             return Twist(v_m_s, v_m_s * (self._bends(command) if command.v_m_s != 0.0 else self._per_m))
-        most = motion.top_turn_rate_rad_s
-        turns = motion.turn_acceleration_rad_s2 * self._dt_s
         return Twist(
             v_m_s,
-            approach(going.w_rad_s, command.w_rad_s, most, turns),
+            approach(going.w_rad_s, command.w_rad_s, self._top_rad_s, self._turns_rad_s),
             approach(going.lateral_m_s, command.lateral_m_s, motion.top_lateral_m_s, slows),
+        )
+
+    def _reaches(self, command: Twist) -> bool:
+        """Whether all its rates are as told within a step."""
+        going = self._going
+        return (
+            abs(command.v_m_s - going.v_m_s) <= self._slows_m_s
+            and abs(command.w_rad_s - going.w_rad_s) <= self._turns_rad_s
+            and command.lateral_m_s == going.lateral_m_s
+            and abs(command.v_m_s) <= self._top_m_s
+            and abs(command.w_rad_s) <= self._top_rad_s
         )
 
     def _bends(self, command: Twist) -> float:

@@ -38,6 +38,7 @@ class LastWord:
         """Begin a step with its readings."""
         if self._left is not None:
             self._guard.sent(self._left)
+            self._arc_stop.sent(self._left)
         self._left, self._t_s = STOP, readings.t_s
         self._guard.take_in(readings)
         self._arc_stop.take_in(readings)
@@ -50,7 +51,7 @@ class LastWord:
         touched_m = self._guard.touched_m(command)
         if not len(touched_m):
             rolls_on = self._arc_stop.follows(command)
-            if not _is_part(rolls_on, command):
+            if rolls_on is not command and not _is_part(rolls_on, command):
                 touched_m = self._guard.touched_m(rolls_on)
         if not len(touched_m):
             self._left = command
@@ -80,7 +81,5 @@ class LastWord:
 
 def _is_part(one: Twist, whole: Twist) -> bool:
     """Whether one is the other but slower, along the same arc."""
-    if one == whole:
-        return True
     share = one.v_m_s / whole.v_m_s if whole.v_m_s != 0.0 else -1.0
     return 0.0 <= share <= 1.0 and one == Twist(one.v_m_s, share * whole.w_rad_s, share * whole.lateral_m_s)
