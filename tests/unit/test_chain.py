@@ -64,6 +64,23 @@ def test_the_second_leg_begins_where_the_first_one_truly_ended(ground: Path) -> 
     assert np.hypot(trace["true_x_m"][-1] - 545.0, trace["true_y_m"][-1] - 45.0) < 12.0
 
 
+def test_a_leg_reads_its_own_plans_and_counts_again() -> None:
+    """What was handed on was taken from it: navigator `goal` fell over its own last plan."""
+    settings = {
+        "world.obstacles": "[]",
+        "world.goal": "{x_m: 3.0, y_m: 1.0}",
+        "task.goals": "[{x_m: 5.0, y_m: 2.0}]",
+        "stack.navigator": "{name: chain, legs: [goal, goal]}",
+        "stack.mapper": "null",
+        "stack.reactive": "null",
+        "stack.escape": "null",
+    }
+    run = simulate(load_mission("museum-1", [f"{key}={value}" for key, value in settings.items()])).finished
+    robot = run.robots[0]
+    assert robot.arrived
+    assert len(robot.plans) == 2 + robot.counts["replans"], "each is told once"
+
+
 @pytest.mark.parametrize(
     ("legs", "says"),
     [

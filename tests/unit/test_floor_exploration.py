@@ -8,7 +8,7 @@ from typing import cast
 import numpy as np
 import pytest
 
-from pilotage.core.types import Pose2
+from pilotage.core.types import Pose2, Twist
 from pilotage.evaluation.floor_map import floor_map_metrics, reachable_floor
 from pilotage.experiments.mission import load_mission, mission_of
 from pilotage.experiments.run import run_mission
@@ -18,6 +18,7 @@ from pilotage.maps.segment_map import SegmentMap
 from pilotage.maps.world_map import WorldMap
 from pilotage.missions.mission import Mission
 from pilotage.sensors.lidar import LidarConfig
+from pilotage.stack.control.local.drive import LocalDrive
 from pilotage.stack.exploration.floor_frontiers import SeenFloor
 from pilotage.stack.interface import Belief, BeliefStatus
 from pilotage.stack.journal import Journal
@@ -253,6 +254,19 @@ def test_a_frontier_that_a_look_does_not_move_is_driven_through(monkeypatch: pyt
     assert metrics["frontiers_given_up"] == 0
     assert metrics["collisions"] == 0
     assert len(once) == len({id(target) for target in once}) >= 2, "each target is met once"
+
+
+def test_an_explorer_heeds_its_laser_whatever_its_local_controller_says(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """One that looks at nothing drives at full speed at whatever stands there."""
+    monkeypatch.setattr(LocalDrive, "toward", lambda *_, **__: Twist(1.0, 0.0))
+    sides: list[list[float]] = [[0, 0, 5, 0], [5, 0, 5, 3], [5, 3, 0, 3], [0, 3, 0, 0]]
+    mission = unknown_floor(sides, Pose2(1.0, 1.5, 0.3), 0.2, 1)
+    mission = mission.model_copy(update={"run": mission.run.model_copy(update={"time_limit_s": 8.0})})
+    metrics = run_mission(mission, save=False).metrics
+    assert metrics["collisions"] == 0
+    assert float(str(metrics["path_length_m"])) > 2.0
 
 
 def test_a_room_behind_a_gap_that_the_body_alone_takes_is_explored() -> None:

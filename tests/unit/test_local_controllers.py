@@ -14,6 +14,11 @@ from pilotage.kernels.control.footprint import discs_clearance
 from pilotage.kernels.control.motion_limits import Drive, advance
 from pilotage.kernels.scans.rays import fan_ranges
 from pilotage.stack.control.local.blind_side import blind_clearance_m
+from pilotage.stack.control.local.command_check import (
+    MARGIN_M,
+    footprint_clearance_m,
+    is_safe,
+)
 from pilotage.stack.control.local.gap_horizon import GapHorizon
 from pilotage.stack.control.local.narrow_passage import NarrowPassage, find_narrow_passage
 from pilotage.stack.control.local.role import (
@@ -154,6 +159,41 @@ def test_our_own_hits_nothing_it_has_seen_with_weak_brakes_worse_than_told(seed:
     weak = LocalLimits(2.0, 0.5, 1.0, 1.0, 4.0, 6.0, 0.1)
     _, least, _ = drive(make("gap-horizon"), circles, weak, true_share=0.75, seconds=12.0)
     assert least > 0.0
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_vfh_sends_nothing_that_its_brakes_cannot_follow(seed: int) -> None:
+    """Fast between posts, with weak brakes: told to creep and turn it is fast yet, and sweeps into one."""
+    rng = np.random.default_rng(seed)
+    weak, told = LocalLimits(1.2, 0.3, 0.9, 0.9, 1.4, 5.0), []
+    for _ in range(25):
+        places = rng.uniform([0.5, -1.5], [3.0, 1.5], (6, 2))
+        posts = np.column_stack([places, np.full(6, 0.1)])
+        twist = Twist(rng.uniform(0.6, 1.2), rng.uniform(-1.0, 1.0))
+        view = view_of(0.0, Pose2(0.0, 0.0, 0.0), twist, posts, weak)
+        view = replace(view, goal_xy_m=(rng.uniform(-2.0, 4.0), rng.uniform(-3.0, 3.0)))
+        command = make("vfh").step(view)
+        scene = RollingGround(RollingConfig()).update(view)
+        assert command == Twist(0.0, 0.0) or is_safe(scene, command, 0.8 * MARGIN_M)
+        told.append(abs(command.v_m_s) > 0.05)
+    assert any(told), "it drives where it can"
+
+
+@pytest.mark.parametrize("radius_m", [0.25, 0.3])
+def test_a_round_robot_turns_where_it_stands_however_near_a_wall_is_told_to_be(radius_m: float) -> None:
+    """By a vague laser it already touches; the corners that stand for its disc would swing into that."""
+    angles = 2.0 * np.pi * np.arange(16) / 16
+    disc = radius_m / math.cos(math.pi / 16) * np.column_stack([np.cos(angles), np.sin(angles)])
+    wall = np.array([[radius_m + 0.01, 0.02 * k - 0.1, 0.02] for k in range(11)])
+    turn, ahead = Twist(0.0, 1.0), Twist(0.2, 0.0)
+    square = radius_m * np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
+    for outline, allowed in ((disc, True), (square, False)):
+        ground = RollingGround(RollingConfig())
+        view = replace(view_of(0.0, Pose2(0.0, 0.0, 0.0), Twist(0.0, 0.0), wall), footprint_xy_m=outline)
+        scene = ground.update(view)
+        assert footprint_clearance_m(scene, 0.0, 0.0, 0.0, 0.1) < 0.0
+        assert is_safe(scene, turn) == allowed
+        assert not is_safe(scene, ahead)
 
 
 @pytest.mark.parametrize("y", [-0.1, 0.12])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from pydantic import Field, field_validator
@@ -38,10 +38,16 @@ class ChainConfig(Config):
 
 @dataclass(slots=True)
 class _Leg:
-    """The navigator under way, and what it alone writes."""
+    """The navigator under way, what it alone writes, and how much of that was handed on.
+
+    It reads its own plans and counts again, so they stay with it.
+    """
 
     stack: Stack
     journal: Journal
+    events: int = 0
+    plans: int = 0
+    counted: dict[str, int] = field(default_factory=dict)
 
 
 @NAVIGATORS.add("chain", ChainConfig)
@@ -114,14 +120,15 @@ class ChainNavigator:
 
     def _tell(self, leg: _Leg) -> None:
         """Hand on what a leg said since the last step."""
-        self._journal.events += leg.journal.events
-        self._journal.plans += leg.journal.plans
-        leg.journal.events.clear()
-        leg.journal.plans.clear()
-        for name, count in leg.journal.counts.items():
-            self._journal.counts[name] = self._journal.counts.get(name, 0) + count
-        leg.journal.counts.clear()
-        told = dict(zip(leg.journal.units, leg.journal.row, strict=True))
+        journal = leg.journal
+        self._journal.events += journal.events[leg.events :]
+        self._journal.plans += journal.plans[leg.plans :]
+        leg.events, leg.plans = len(journal.events), len(journal.plans)
+        for name, count in journal.counts.items():
+            more = count - leg.counted.get(name, 0)
+            self._journal.counts[name] = self._journal.counts.get(name, 0) + more
+        leg.counted = dict(journal.counts)
+        told = dict(zip(journal.units, journal.row, strict=True))
         values = (told.get(name, math.nan) for name in list(COLUMNS)[1:])
         self._channel.tell(float(self._at), *values)
 

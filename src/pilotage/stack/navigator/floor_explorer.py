@@ -14,6 +14,7 @@ from pilotage.maps.occupancy_grid import OccupancyGrid
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, Readings
+from pilotage.stack.control.last_word import LastWord
 from pilotage.stack.control.local.drive import LocalDrive
 from pilotage.stack.exploration.floor_frontiers import SeenFloor
 from pilotage.stack.interface import NAVIGATORS, Belief, BeliefStatus, StackStatus
@@ -97,6 +98,7 @@ class FloorExplorer(LocalizingNavigator):
             reverse_m_s=config.reverse_m_s,
             needed_by="navigator 'floor-frontier'",
         )
+        self._last_word = LastWord(robot)
         self._stall_s = patience_s(config.stall_s, STALL_M, robot.motion.top_speed_m_s)
         self._radius_m, self._clearance_m = robot.radius_m, robot.radius_m + config.clearance_m
         self._squeeze_m = min(config.squeeze_m, config.clearance_m)
@@ -134,6 +136,7 @@ class FloorExplorer(LocalizingNavigator):
         """Localize, look whether there is something better to do, and drive."""
         belief = self._localizer.step(readings)
         self._drive.move(readings)
+        self._last_word.take_in(readings)
         if self._draws:
             self._draw(readings, belief.pose)
         if self._status is not StackStatus.RUNNING or not len(self._grid.poses):
@@ -148,7 +151,8 @@ class FloorExplorer(LocalizingNavigator):
         if target is None:
             return STOP
         tolerance_m = 0.5 * self._arrival_m()
-        return self._drive.toward(self._led_to(target.path, here), belief, readings, tolerance_m)
+        command = self._drive.toward(self._led_to(target.path, here), belief, readings, tolerance_m)
+        return command if self._last_word.allows(command) else STOP
 
     def _draw(self, readings: Readings, pose: Pose2) -> None:
         """Put a scan on the own map where the robot has moved since the last one."""

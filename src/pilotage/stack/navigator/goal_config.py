@@ -54,6 +54,7 @@ class GoalNavigatorConfig(Config):
     """How long it stands still first where its start pose seems too near an obstacle to plan from."""
     cruise_speed_m_s: Positive = 0.5
     max_replans: int = Field(default=30, ge=0)
+    """On the way to each goal, but for those among people, before it gives up."""
     guard: GuardConfig = GuardConfig()
     wander: WanderConfig = WanderConfig()
     moving_bodies: MovingBodiesConfig = MovingBodiesConfig()

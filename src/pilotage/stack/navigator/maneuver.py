@@ -61,6 +61,8 @@ WALL_M, LEAST_M = 0.02, 0.005
 """Kept from the walls of the map on a path for the outline, or half of what the path keeps; and at least."""
 MOST_STOPS, STEP_BACK_M = 12, 0.5
 """How often it plans anew where its lasers show no room for its plan, and from how far before that."""
+GOT_ON_M = 2.0
+"""With so much less to go than when it was stopped first it has got on: a sweep meets many a nook."""
 DOUBT_S = 10.0
 """Who is lost stands for so long, and drives about then."""
 SEEN_M = 0.05
@@ -279,7 +281,7 @@ class ManeuverNavigator(LocalizingNavigator):
             # What no map explains may go by itself: as before all that it heeds it waits.
             waits = self._own_half.sees(shown_m)
             if not waits:
-                return self._stops_short(readings.t_s, shown_m)
+                return self._stops_short(readings.t_s, shown_m, to_go_m)
         if waits:
             self._reference.stay()
             (x, y, theta), rate, command = there.tolist(), 0.0, STOP
@@ -304,7 +306,7 @@ class ManeuverNavigator(LocalizingNavigator):
         self._yielding = Yielding(
             self._config.yielding, self._robot.dt_s, self._robot.streams.stream("yielding")
         )
-        self._stops = 0
+        self._stops, self._stopped_to_go_m = 0, math.inf
 
     def _toward(self, pose: Pose2, there: Pose2, feedforward: Twist) -> Twist:
         """The command that follows the reference."""
@@ -318,11 +320,14 @@ class ManeuverNavigator(LocalizingNavigator):
         # The way back along the path is the other direction's: a piece is driven in its own only.
         return Twist(max(twist.v_m_s, 0.0) if v > 0.0 else min(twist.v_m_s, 0.0), twist.w_rad_s)
 
-    def _stops_short(self, t_s: float, shown_m: FloatArray) -> Twist:
+    def _stops_short(self, t_s: float, shown_m: FloatArray, to_go_m: float) -> Twist:
         """A laser shows a wall where the plan leads: with (K, 2) of it on its own map it plans anew.
 
-        From some way back, where it can: beside what it almost touches there is no room for a plan.
+        From some way back, where it can: beside what it almost touches there is no room for a plan. It gives
+        up where it gets no farther along its plans.
         """
+        if not self._backs and to_go_m < self._stopped_to_go_m - GOT_ON_M:
+            self._stops, self._stopped_to_go_m = 0, to_go_m
         self._stops += 1
         if self._stops > MOST_STOPS:
             self._end(t_s, StackStatus.FAILED, "stuck: its lasers show no room where its plans lead")

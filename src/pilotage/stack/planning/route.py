@@ -138,7 +138,8 @@ class RoutePlanner:
             raise InputError(
                 f"route: expected a goal within {tolerance_m:g} m of the route's last point "
                 f"({points[-1, 0]:g}, {points[-1, 1]:g}), found ({goal.x_m:g}, {goal.y_m:g}); "
-                "end points_m at the goal"
+                "end points_m at the goal; to goals one after the other, as a task's points, another planner "
+                "leads, such as theta-star"
             )
         here = np.array([start.x_m, start.y_m])
         passed = 0

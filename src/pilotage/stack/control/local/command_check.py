@@ -24,6 +24,10 @@ LESS = 0.8
 """Of the margin, where no command keeps all of it."""
 BACK_M_S = 0.1
 """Backwards, where nothing else is free."""
+ROUND = 0.98
+"""With an inner radius of this share of the outer one a body is a disc, by the corners that stand for one."""
+AT_REST_M_S = 0.01
+"""Slower than this a robot stands."""
 BACK_M, GAIN = 0.05, 0.1
 """From within the margin it backs where that brings it away by this share of the way."""
 
@@ -32,9 +36,12 @@ def is_safe(scene: Scene, command: Twist, margin_m: float = MARGIN_M) -> bool:
     """Whether a command can be held for a step and then be braked along its arc, also with worse brakes.
 
     Nearer than ``margin_m`` to what was seen it may not come, and where it already is, no nearer at all:
-    a millimetre in every step would end in a contact.
+    a millimetre in every step would end in a contact. A round robot at rest may turn wherever it stands.
     """
-    x, y, theta, _, _ = scene.start
+    x, y, theta, v_m_s, _ = scene.start
+    turns = command.v_m_s == command.lateral_m_s == 0.0 and abs(v_m_s) < AT_REST_M_S
+    if turns and scene.body.inner_m > ROUND * scene.body.outer_m:
+        return True
     begin = footprint_clearance_m(scene, x, y, theta, margin_m)
     discs = scene.movers.foretold(scene.delay_s + STEP_S, STEP_S, STEPS, PEOPLE_STD)
     safe, least = command_is_safe(

@@ -13,6 +13,7 @@ from pilotage.kernels.control.band import path_distances
 from pilotage.kernels.control.polar_histogram import best_opening, binary_histogram, polar_histogram
 from pilotage.kernels.geometry.motion import wrap
 from pilotage.sensors.sensor import NonNegative, Positive
+from pilotage.stack.control.local.command_check import first_safe, slower
 from pilotage.stack.control.local.role import LOCAL_CONTROLLERS, LocalView
 from pilotage.stack.control.local.rolling import Scene
 from pilotage.stack.control.local.rolling_config import RollingConfig
@@ -46,8 +47,9 @@ class VfhConfig(Config):
 class Vfh(RollingController):
     """VFH+ (Ulrich and Borenstein 1998): the robot is a disc, enlarged obstacles block directions.
 
-    Speed: what still stops before the nearest obstacle of the chosen direction, less for a turn. It takes the
-    robot for its outer disc, so openings narrower than that are closed to it.
+    Speed: what still stops before the nearest obstacle of the chosen direction, less for a turn, and no more
+    than what can be braked along the arc: a robot with weak brakes is not yet as slow as it is told to be
+    when it turns. It takes the robot for its outer disc, so openings narrower than that are closed to it.
     """
 
     def __init__(self, config: VfhConfig, generator: np.random.Generator) -> None:
@@ -58,7 +60,12 @@ class Vfh(RollingController):
         self._before = math.nan
 
     def _decide(self, view: LocalView, scene: Scene) -> Twist:
+        """The histogram's command, or what can be driven of it."""
         del view
+        command = self._steered(scene)
+        return first_safe(scene, [*slower(command), Twist(0.0, command.w_rad_s)])
+
+    def _steered(self, scene: Scene) -> Twist:
         config = self._config
         x, y, theta = scene.start[0], scene.start[1], scene.start[2]
         ahead = self._in_sight(scene)

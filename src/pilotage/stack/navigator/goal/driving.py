@@ -234,6 +234,7 @@ def _reach(context: Context, state: Following, pose: Pose2) -> Move:
             return Move(state, turned_by(off_rad, context.turn_rate_rad_s))
         return arrive(context)
     context.goals.pop(0)
+    context.tries = 0
     reached = context.journal.count("goals")
     context.mode = Mode.REPLAN
     context.follower.drop()

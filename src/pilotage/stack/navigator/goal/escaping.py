@@ -156,7 +156,7 @@ def replan(context: Context, resumes: State, pose: Pose2, why: str) -> Move:
         remedy = (
             "" if context.escape is not None else ", and the stack has no escape (stack.escape: back-out)"
         )
-        gave_up = f"stuck: gave up after {context.journal.counts['replans']} replans"
+        gave_up = f"stuck: gave up after {context.tries} replans"
         return fail(context, f"{gave_up}, the last because {why}{remedy}")
     context.again = context.again + 1 if context.planned_here(pose) else 0
     if context.again >= AGAIN and context.escape is not None:
