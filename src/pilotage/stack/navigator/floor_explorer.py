@@ -139,6 +139,9 @@ class FloorExplorer(LocalizingNavigator):
         self._last_word.take_in(readings)
         if self._draws:
             self._draw(readings, belief.pose)
+        return self._last_word.leaving(self._command(readings, belief))
+
+    def _command(self, readings: Readings, belief: Belief) -> Twist:
         if self._status is not StackStatus.RUNNING or not len(self._grid.poses):
             return STOP
         here = np.array([belief.pose.x_m, belief.pose.y_m])
