@@ -37,10 +37,11 @@ class ArcStop:
         self._steers = motion.least_turning_radius_m > 0.0
         self._odometry = odometry_of_every_step(robot)
         self._going, self._per_m = STOP, 0.0
+        self._is_handed = False
 
     def take_in(self, readings: Readings) -> None:
         """Begin a step with its readings."""
-        if not self._rolls or self._odometry is None:
+        if not self._is_handed or self._odometry is None:
             return
         name, sheet = self._odometry
         told, going, dt_s = readings.by_sensor.get(name), self._going, self._dt_s
@@ -64,6 +65,7 @@ class ArcStop:
         """What leaves in this step: the command, or of a stop what brakes along the arc."""
         if not self._rolls:
             return command
+        self._is_handed = True
         if command == STOP and not self._steers:
             command = self._braked()
         if self._steers and command.v_m_s != 0.0:
@@ -72,8 +74,8 @@ class ArcStop:
         return command
 
     def follows(self, command: Twist) -> Twist:
-        """What it does in the next step, told a command."""
-        if not self._rolls:
+        """What it does in the next step, told a command; as told where nothing was handed to ``leaving``."""
+        if not self._is_handed:
             return command
         going, motion, slows = self._going, self._motion, self._slows_m_s
         v_m_s = approach(going.v_m_s, command.v_m_s, motion.top_speed_m_s, slows)
