@@ -31,10 +31,14 @@ class ArcStop:
 
     def __init__(self, robot: RobotKnowledge) -> None:
         motion = robot.motion
-        self._motion, self._dt_s = motion, robot.dt_s
+        self._dt_s, self._tops = robot.dt_s, (motion.top_speed_m_s, motion.top_turn_rate_rad_s)
         self._slows_m_s = motion.braking_m_s2 * robot.dt_s
+        self._turns_rad_s = motion.turn_acceleration_rad_s2 * robot.dt_s
+        self._may_differ_m_s = (STEPS + motion.delay_s / robot.dt_s) * self._slows_m_s
         self._rolls = self._slows_m_s < motion.top_speed_m_s
         self._steers = motion.least_turning_radius_m > 0.0
+        self._top_lateral_m_s, self._least_m = motion.top_lateral_m_s, motion.least_turning_radius_m
+        self._bends_per_m = motion.curvature_rate_per_m_s * robot.dt_s
         self._odometry = odometry_of_every_step(robot)
         self._going, self._per_m = STOP, 0.0
         self._is_handed = False
@@ -47,18 +51,18 @@ class ArcStop:
         told, going, dt_s = readings.by_sensor.get(name), self._going, self._dt_s
         if not isinstance(told, OdometryIncrement):
             return
-        drove_m = math.hypot(told.distance_m, told.lateral_m)
+        off_m_s = math.hypot(told.distance_m / dt_s - going.v_m_s, told.lateral_m / dt_s - going.lateral_m_s)
+        if off_m_s <= self._may_differ_m_s:
+            return
         distance_var, _ = increment_variances(
-            drove_m,
+            math.hypot(told.distance_m, told.lateral_m),
             told.angle_rad,
             sheet.distance_var_m2_per_m,
             sheet.distance_var_m2_per_rad,
             sheet.angle_var_rad2_per_rad,
             sheet.angle_var_rad2_per_m,
         )
-        may_differ_m_s = (STEPS + self._motion.delay_s / dt_s) * self._slows_m_s
-        off_m_s = math.hypot(told.distance_m / dt_s - going.v_m_s, told.lateral_m / dt_s - going.lateral_m_s)
-        if off_m_s > may_differ_m_s + STDS * math.sqrt(distance_var) / dt_s:
+        if off_m_s > self._may_differ_m_s + STDS * math.sqrt(distance_var) / dt_s:
             self._going = Twist(told.distance_m / dt_s, told.angle_rad / dt_s, told.lateral_m / dt_s)
 
     def leaving(self, command: Twist) -> Twist:
@@ -68,33 +72,29 @@ class ArcStop:
         self._is_handed = True
         if command == STOP and not self._steers:
             command = self._braked()
+        self._going = self.follows(command)
         if self._steers and command.v_m_s != 0.0:
             self._per_m = self._bends(command)
-        self._going = self.follows(command)
         return command
 
     def follows(self, command: Twist) -> Twist:
         """What it does in the next step, told a command; as told where nothing was handed to ``leaving``."""
         if not self._is_handed:
             return command
-        going, motion, slows = self._going, self._motion, self._slows_m_s
-        v_m_s = approach(going.v_m_s, command.v_m_s, motion.top_speed_m_s, slows)
+        going, slows, (top_m_s, top_rad_s) = self._going, self._slows_m_s, self._tops
+        v_m_s = approach(going.v_m_s, command.v_m_s, top_m_s, slows)
         if self._steers:
             return Twist(v_m_s, v_m_s * (self._bends(command) if command.v_m_s != 0.0 else self._per_m))
-        most = motion.top_turn_rate_rad_s
-        turns = motion.turn_acceleration_rad_s2 * self._dt_s
-        return Twist(
-            v_m_s,
-            approach(going.w_rad_s, command.w_rad_s, most, turns),
-            approach(going.lateral_m_s, command.lateral_m_s, motion.top_lateral_m_s, slows),
-        )
+        w_rad_s = approach(going.w_rad_s, command.w_rad_s, top_rad_s, self._turns_rad_s)
+        if self._top_lateral_m_s == 0.0:
+            return Twist(v_m_s, w_rad_s)
+        lateral_m_s = approach(going.lateral_m_s, command.lateral_m_s, self._top_lateral_m_s, slows)
+        return Twist(v_m_s, w_rad_s, lateral_m_s)
 
     def _bends(self, command: Twist) -> float:
         """The curvature of a car's path in the next step."""
-        motion = self._motion
-        tightest = 1.0 / motion.least_turning_radius_m
-        change = motion.curvature_rate_per_m_s * self._dt_s
-        return approach(self._per_m, command.w_rad_s / command.v_m_s, tightest, change)
+        asked_per_m = command.w_rad_s / command.v_m_s
+        return approach(self._per_m, asked_per_m, 1.0 / self._least_m, self._bends_per_m)
 
     def _braked(self) -> Twist:
         going = self._going
