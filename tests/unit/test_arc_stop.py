@@ -108,6 +108,24 @@ def test_who_leaves_no_arc_is_told_to_stop(motion: MotionConfig) -> None:
     assert left(arc_stop, STOP) == STOP
 
 
+def test_a_cars_wheels_are_reckoned_to_turn_as_fast_as_they_can() -> None:
+    """From straight on to the tightest arc, as the car itself does, and on that while it brakes."""
+    motion = BicycleConfig(max_acceleration_m_s2=0.4, max_steering_rate_rad_s=0.5, max_steering_rad=0.3)
+    sim = Simulator(World.of(FAR), [robot(ODOMETRY, motion=motion, start=Pose2(0.0, 0.0, 0.0))], DT_S)
+    arc_stop = ArcStop(replace(told_of().robot, motion=motion, sensors=ODOMETRY, dt_s=DT_S))
+    told = [Twist(0.8, 0.0)] * 30 + [Twist(0.8, 2.0)] * 8 + [STOP] * 10
+    for step, command in enumerate(told):
+        expected = arc_stop.follows(command)
+        left(arc_stop, command)
+        sim.step([command])
+        if step:
+            found = sim.bodies[0].twist
+            assert found.v_m_s == pytest.approx(expected.v_m_s, abs=1e-9)
+            # A curvature's rate stands for that of a steering angle: all but exact near straight on.
+            assert found.w_rad_s == pytest.approx(expected.w_rad_s, abs=0.03)
+    assert expected.w_rad_s > 0.1
+
+
 def test_a_turn_on_the_spot_stops_at_once() -> None:
     arc_stop = ArcStop(replace(told_of().robot, motion=DifferentialDriveConfig(**WEAK), dt_s=DT_S))
     for _ in range(20):

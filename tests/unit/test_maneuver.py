@@ -38,10 +38,17 @@ def test_who_believes_to_stand_in_a_wall_looks_again_before_it_gives_up() -> Non
         assert metrics["collisions"] == 0
 
 
-def test_who_knows_nothing_of_its_start_is_told_who_finds_out() -> None:
-    """It planned from the middle of the map, where its unknown belief had its pose."""
-    with pytest.raises(InputError, match="take navigator goal"):
-        build(load_mission("car-park", ["stack.initial={known: false}"]))
+def test_who_knows_nothing_of_its_start_plans_from_where_it_finds_itself() -> None:
+    """It planned from the middle of the map, where its unknown belief had its pose; then it was refused."""
+    experiment = build(load_mission("car-park", ["stack.initial={known: false}"]))
+    assert not experiment.team[0].journal.plans
+    told = run_loop(experiment).finished.robots[0]
+    assert told.arrived
+    first = told.plans[0]
+    assert first.t_s > 0.0
+    row = int(np.searchsorted(told.trace["t_s"], first.t_s))
+    true_m = told.trace["true_x_m"][row], told.trace["true_y_m"][row]
+    assert math.dist(true_m, tuple(first.states[0, :2])) < 0.2
 
 
 def test_the_way_to_go_is_that_of_the_plan_and_only_grows_less() -> None:

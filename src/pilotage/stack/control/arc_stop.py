@@ -70,9 +70,9 @@ class ArcStop:
         """A command left."""
         if not self._rolls:
             return
+        self._going = self.follows(command)
         if self._steers and command.v_m_s != 0.0:
             self._per_m = self._bends(command)
-        self._going = self.follows(command)
 
     def leaving(self, command: Twist) -> Twist:
         """What is to leave for a command: itself, or of a stop what brakes along the arc."""

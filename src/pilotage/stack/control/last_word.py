@@ -18,8 +18,8 @@ class LastWord:
     """Says whether a command may leave; what to do where it may not is the navigator's own business.
 
     To be told of every step's readings, asked about every command that is no stop, and handed what leaves in
-    the end, which it brakes along the arc where that is a stop; who hands it nothing drives what it allowed
-    last, by its reckoning.
+    the end, which it brakes along the arc where that is a stop. Who hands it nothing, as a robot on patrol,
+    which sees to its stops itself, drives what it allowed last, by its reckoning.
 
     Attributes
     ----------

@@ -56,7 +56,13 @@ class Wanderer:
     ) -> None:
         self._config = config
         self._name = lidar_name
-        self._half_width = robot.radius_m + config.margin_m
+        self._half_width, self._nose_m = robot.radius_m + config.margin_m, 0.0
+        corners_m = robot.footprint.points_m
+        if robot.motion.least_turning_radius_m > 0.0 and len(corners_m):
+            # It sweeps no disc about its axle: a lane is as wide as its body, and ends before its nose.
+            body_m = float(np.abs(corners_m[:, 1]).max())
+            self._half_width = body_m + config.margin_m
+            self._nose_m = max(float(corners_m[:, 0].max()) - body_m, 0.0)
         self._directions = clustering.beam_directions(
             float(lidar.beam_angles_rad()[0]) + lidar.mount.theta_rad, lidar.beam_step_rad, lidar.beams
         )
@@ -113,6 +119,7 @@ class Wanderer:
         measured = ~np.isnan(ranges_m)
         points = (clustering.scan_points(ranges_m, self._directions) + self._arm)[measured]
         free = wander.free_lengths(points, self._lanes_rad, self._half_width, self._config.reach_m)
+        free = np.maximum(free - self._nose_m, 0.0)
         looks = self._looks.sum(axis=1)
         unseen = (looks == 0) | ((self._looks & measured).sum(axis=1) < LEAST_SHARE * looks)
         return np.where(unseen, 0.0, free)

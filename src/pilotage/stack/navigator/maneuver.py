@@ -105,7 +105,8 @@ class ManeuverNavigator(LocalizingNavigator):
     way to who walks, who comes farther than his half. Where that stays in the way it
     plans around it, or backs out of the way that it came. Where it cannot keep up with the plan it plans
     anew; what a path that covers a floor left of it, as far as the robot knows, is driven in the end. Lost,
-    it stands, and who can turn on the spot drives about after a while.
+    it stands, and drives about after a while, a car ahead and back in turn; told nothing of its start it does
+    so at once, and plans from where it finds itself.
     """
 
     def __init__(
@@ -152,10 +153,8 @@ class ManeuverNavigator(LocalizingNavigator):
         self._trail: Trail | None = None
         self._think_at_s = 0.0
         if self.belief.status is BeliefStatus.LOST:
-            raise InputError(
-                "navigator 'maneuver': expected to be told its start (stack.initial), found it lost; it "
-                "plans from there: take navigator goal, which drives until it has found itself"
-            )
+            self._lost_s = -DOUBT_S
+            return
         self._think(0.0)
         if self._plan.hopeless and self._plan.too_tight:
             raise InputError(
@@ -294,7 +293,7 @@ class ManeuverNavigator(LocalizingNavigator):
     def _looks_around(self, readings: Readings) -> Twist:
         """Lost: it waits, as doubts pass, and drives about then, for who stands sees nothing new."""
         self._lost_s = min(self._lost_s, readings.t_s)
-        if readings.t_s - self._lost_s < DOUBT_S or self._robot.motion.least_turning_radius_m > 0.0:
+        if readings.t_s - self._lost_s < DOUBT_S:
             return STOP
         if not self._wandered:
             self._wandered = True

@@ -7,6 +7,7 @@ import math
 from pilotage.core.types import STOP, Twist
 from pilotage.sensors.readings import Readings
 from pilotage.stack.control.last_word import LastWord
+from pilotage.stack.control.shunting import Shunting
 from pilotage.stack.control.wander import WanderConfig, Wanderer
 from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.localization.localizer import Abilities, Localizer
@@ -14,11 +15,15 @@ from pilotage.stack.localization.localizer import Abilities, Localizer
 LED_S, FREE_S = 15.0, 10.0
 """It is led for so long, then goes where it likes: what stands in the way may be on no map."""
 ELSEWHERE_S = 1.0
-"""Where a laser shows no room it turns for so long before it drives on."""
+"""Where a laser shows no room it turns for so long before it drives on,"""
+SHUNTS_S = 4.0
+"""and a car for so long: a leg of its takes as long."""
 
 
 class Wandering:
     """Wanders by the scanner, into nothing that a laser shows; without one the robot stands still.
+
+    A car, which cannot turn on the spot, does so ahead and back (``Shunting``).
 
     Attributes
     ----------
@@ -32,6 +37,9 @@ class Wandering:
         self._wanderer, self._last_word = Wanderer.of(config, robot), last_word
         self._look = Abilities.of(localizer).look_bearing_rad
         self._turn_rad_s = config.max_turn_rate_rad_s
+        self._least_m = robot.motion.least_turning_radius_m
+        self._shunting = Shunting(robot, last_word.allows) if self._least_m > 0.0 else None
+        self._shunts = False
         self._elsewhere_until_s = -math.inf
         self.plan_at_s = 0.0
 
@@ -42,6 +50,8 @@ class Wandering:
         led = readings.t_s % (LED_S + FREE_S) < LED_S
         bearing = self._look() if led else None
         command = self._wanderer.step(readings, bearing)
+        if self._shunting is not None:
+            return self._steered(self._shunting, readings.t_s, command)
         if readings.t_s >= self._elsewhere_until_s:
             if self._last_word.allows(command):
                 return command
@@ -50,6 +60,21 @@ class Wandering:
                 self._turn_rad_s = math.copysign(self._turn_rad_s, command.w_rad_s)
             self._elsewhere_until_s = readings.t_s + ELSEWHERE_S
         return self._turns()
+
+    def _steered(self, shunting: Shunting, t_s: float, command: Twist) -> Twist:
+        """The command as a car can drive it: turns, and what its lasers show no room for, by shunting."""
+        most = command.v_m_s / self._least_m
+        bent = Twist(command.v_m_s, min(max(command.w_rad_s, -most), most))
+        if command.v_m_s > 0.0 and t_s >= self._elsewhere_until_s and self._last_word.allows(bent):
+            self._shunts = False
+            return bent
+        if not self._shunts:
+            self._shunts = True
+            self._turn_rad_s = math.copysign(self._turn_rad_s, command.w_rad_s)
+            shunting.begin()
+        if command.v_m_s > 0.0 and t_s >= self._elsewhere_until_s:
+            self._elsewhere_until_s = t_s + SHUNTS_S
+        return shunting.step(self._turn_rad_s)
 
     def _turns(self) -> Twist:
         """On the spot, the other way round where corners have no room for this one; else it stands."""
