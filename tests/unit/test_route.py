@@ -126,6 +126,6 @@ def test_misuse_is_refused() -> None:
     with pytest.raises(InputError, match="two different points"):
         RoutePlanner(RouteConfig(points_m=[(1, 1), (1, 1)]))
     with pytest.raises(
-        InputError, match="end points_m at the goal; to goals one after the other.*theta-star"
+        InputError, match=r"end points_m at the goal; to goals one after the other.*theta-star"
     ):
         follow([(0, 0), (4, 0)], (0, 0, 0), (9, 9, None))
