@@ -15,13 +15,15 @@ from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, Pose2, Twist
 from pilotage.evaluation.driving import poses
 from pilotage.experiments.loop import simulate
-from pilotage.experiments.mission import load_mission
+from pilotage.experiments.mission import load_mission, mission_of
+from pilotage.experiments.run import run_mission
 from pilotage.kernels.filters import particles
 from pilotage.maps.nearest_obstacles import NearestObstacles
 from pilotage.maps.rasterize import rasterized
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.readings import LidarScan, Readings
+from pilotage.stack.localization.likelihood_field import thin_share
 from pilotage.stack.localization.localizer import LOCALIZERS
 from pilotage.stack.localization.particle_filter import MclConfig, ParticleFilterLocalizer
 from pilotage.stack.localization.same_witness import widening
@@ -203,3 +205,55 @@ def test_misuse_is_told() -> None:
         told_of().localizer(ParticleFilterLocalizer, MclConfig(least_particles=500, most_particles=100))
     with pytest.raises(InputError, match=r"world\.map"):
         LOCALIZERS.configure("particle-filter", {"grid_file": "office.yaml"}, "stack.localizer")
+
+
+def room_of_faces(thick_m: float) -> list[list[float]]:
+    """A room's inner face and, if it has any thickness, its outer one."""
+    out = []
+    for more in (0.0, thick_m)[: 1 + (thick_m > 0.0)]:
+        x0, y0, x1, y1 = -more, -more, 5.0 + more, 8.0 + more
+        out += [[x0, y0, x1, y0], [x1, y0, x1, y1], [x1, y1, x0, y1], [x0, y1, x0, y0]]
+    return out
+
+
+def test_a_wall_is_thin_where_its_other_face_is_near() -> None:
+    one, two = (np.array(room_of_faces(thick_m)) for thick_m in (0.0, 0.04))
+    assert thin_share(one, 0.1) == 0.0
+    assert thin_share(two, 0.1) > 0.95
+    assert thin_share(two, 0.03) == 0.0
+    # In pieces, and crossed by others, no wall is thicker or thinner.
+    halves = np.vstack([np.column_stack([one[:, :2], one.reshape(-1, 2, 2).mean(axis=1)]), one])
+    assert thin_share(halves, 0.1) == 0.0
+    assert thin_share(np.array([[0.0, 0.0, 2.0, 0.0], [1.0, -1.0, 1.0, 1.0]]), 0.1) == 0.0
+    assert thin_share(np.zeros((0, 4)), 0.1) == 0.0
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_beams_that_are_vaguer_than_a_wall_is_thick_leave_it_honest(seed: int) -> None:
+    """Ends beyond the face they met lie nearer to the other one: 2 cm off, and sure of 5 mm (NEES 33)."""
+    values = load_mission("museum-walls").model_dump(mode="json")
+    values["world"] |= {
+        "map": {"map": "room", "walls_m": room_of_faces(0.04)},
+        "start": {"x_m": 3.5, "y_m": 1.0, "theta_rad": 0.0},
+        "goal": None,
+        "landmarks": None,
+    }
+    lidar = {"name": "lidar", "rate_hz": 5, "beams": 539, "field_of_view_rad": 6.28, "max_range_m": 5.0}
+    values["robot"]["sensors"] = {
+        "odometry": {"name": "wheel-odometry", "rate_hz": 10},
+        "lidar": lidar | {"range_var_m2": 0.0009},
+    }
+    values["stack"] |= dict.fromkeys(("planner", "local_planner", "controller", "reactive", "escape"))
+    values["stack"] |= {
+        "navigator": {"name": "open-loop", "speed_m_s": 0.3, "turn_rate_rad_s": 0.4, "duration_s": 60.0},
+        "localizer": {"name": "particle-filter"},
+    }
+    values |= {
+        "mission": "thin",
+        "task": {"name": "drive"},
+        "run": {"dt_s": 0.1, "time_limit_s": 60, "seed": seed},
+    }
+    metrics = run_mission(mission_of(values), save=False).metrics
+    assert metrics["collisions"] == 0
+    assert float(str(metrics["nees_mean"])) < 4.0
+    assert float(str(metrics["silently_wrong_s"])) < 2.0

@@ -12,6 +12,7 @@ import pytest
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray, Goal, Pose2
+from pilotage.evaluation.tasks.sweep import _too_little
 from pilotage.experiments import warm_up
 from pilotage.experiments.build.build import build
 from pilotage.experiments.loop import run_loop
@@ -456,3 +457,17 @@ def test_at_corners_it_turns_first_by_the_shorter_way() -> None:
     # Nobody jumps, nobody is too fast, and it ends where the path does.
     assert np.hypot(*np.diff(rows[:, :2], axis=0).T).max() <= 0.5 * 0.1 + 1e-9
     assert rows[-1, :3] == pytest.approx([1.0, 0.0, -np.pi / 2])
+
+
+@pytest.mark.parametrize(
+    ("swept", "least", "told"),
+    [
+        (0.9998986, 0.9999, "swept 99.9899 % of the floor, not 99.99 %"),
+        (0.25, 0.9999, "swept 25.00 % of the floor, not 99.99 %"),
+        (0.99989999, 0.9999, "swept 99.989999 % of the floor, not 99.99 %"),
+        (0.4, 0.5, "swept 40.00 % of the floor, not 50 %"),
+    ],
+)
+def test_what_was_swept_is_told_apart_from_what_was_asked_for(swept: float, least: float, told: str) -> None:
+    """It said "swept 99.99 % of the floor, not 99.99 %"."""
+    assert _too_little(swept, least) == told

@@ -352,3 +352,16 @@ def test_a_hazard_stepped_on_is_told_with_how_wrong_the_robot_was(wall: Path, tm
         assert told is not None
         assert int(told[1]) == metrics["hazard_contacts"]
         assert 0.2 < float(told[2]) < 10.0
+
+
+def test_how_far_off_hazards_are_that_there_are_none_of_nobody_says(tmp_path: Path) -> None:
+    """As far as it looks, 200 cells, was told for the least clearance."""
+    Image.fromarray(np.zeros((40, 60), np.uint8)).save(tmp_path / "obstacles.png")
+    ground = settings(tmp_path / "obstacles.png", "run.time_limit_s=20000")
+    result = run_mission(load_mission("gale-pose", ground), out=tmp_path)
+    assert result.run_dir is not None
+    told = json.loads((result.run_dir / "metrics.json").read_text())
+    assert told["min_clearance_m"] is None
+    page = write_report(result.run_dir).read_text()
+    assert "least clearance" not in page
+    assert "The path between the hazards" not in page

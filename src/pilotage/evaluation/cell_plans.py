@@ -9,7 +9,7 @@ import numpy as np
 from pilotage.core.types import FloatArray
 from pilotage.evaluation.finished import FinishedRun, RobotRun
 from pilotage.evaluation.relief import relief
-from pilotage.evaluation.terrain import CLEARANCE_REACH_CELLS
+from pilotage.evaluation.terrain import CLEARANCE_REACH_CELLS, if_any_is_near
 from pilotage.kernels.grids.blocked_distance import distance_to_blocked
 from pilotage.stack.navigator.cells import CellRoute
 
@@ -45,7 +45,7 @@ def route_columns(run: FinishedRun, robot: RobotRun, route: CellRoute) -> dict[s
         "path_column": cells[:, 1].astype(np.float64),
         "elevation_m": heights,
         "slope_rad": slopes,
-        "hazard_distance_m": away,
+        "hazard_distance_m": if_any_is_near(away, chart.grid),
     }
 
 

@@ -34,7 +34,7 @@ def terrain_columns(run: FinishedRun, robot: RobotRun) -> dict[str, FloatArray]:
     steps = np.hypot(*np.diff(np.vstack([start, points]), axis=0).T)
     columns = {
         "distance_m": np.cumsum(steps),
-        "hazard_distance_m": hazard_distance_m(points, chart.grid),
+        "hazard_distance_m": if_any_is_near(hazard_distance_m(points, chart.grid), chart.grid),
     }
     if chart.elevation is not None:
         columns["elevation_m"] = chart.elevation.heights_at(points)
@@ -134,6 +134,12 @@ def hazard_distance_m(points_xy_m: FloatArray, grid: OccupancyGrid) -> FloatArra
     places = grid.places_at(points_xy_m[near])
     away[near] = distance_to_blocked(places, blocked, min(math.ceil(between[near].max()) + 1, reach))
     return away * grid.resolution_m
+
+
+def if_any_is_near(away_m: FloatArray, grid: OccupancyGrid) -> FloatArray:
+    """(N,) distances from hazards; all nan where none is within reach: how far they are nobody measured."""
+    near = away_m < CLEARANCE_REACH_CELLS * grid.resolution_m
+    return away_m if near.any() else np.full(len(away_m), math.nan)
 
 
 STRETCH_M = 1000.0

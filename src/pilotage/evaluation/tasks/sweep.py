@@ -102,10 +102,18 @@ class SweepTask(WatchedTask):
         }
         metrics["success"] = robot.arrived and robot.collisions == 0 and swept >= self._config.least
         if robot.arrived and swept < self._config.least:
-            metrics["reason"] = (
-                f"swept {100.0 * swept:.2f} % of the floor, not {100.0 * self._config.least:g} %"
-            )
+            metrics["reason"] = _too_little(swept, self._config.least)
         return Verdict(metrics, ({"nees": nees},), {})
+
+
+def _too_little(swept: float, least: float) -> str:
+    """Both shares, with as many digits as tell one from the other."""
+    wanted = f"{100.0 * least:g}"
+    for digits in range(2, 12):
+        told = f"{100.0 * swept:.{digits}f}"
+        if float(told) < float(wanted):
+            break
+    return f"swept {told} % of the floor, not {wanted} %"
 
 
 def _check_planned(choice: ComponentChoice | None, width_m: float) -> None:

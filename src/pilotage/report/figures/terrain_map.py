@@ -83,6 +83,8 @@ def hazard_map_figure(run: RunData) -> Illustration:
     pictures = run.terrain
     if pictures is None:
         return Illustration(slug, title, "", _NOTHING)
+    if not pictures.hazards.any():
+        return Illustration(slug, title, "", "The ground has no hazards.")
     figure, axes = ground_axes(pictures)
     show_ground(axes, pictures, np.repeat(pictures.hazards[..., None], 3, axis=2))
     drawn = _path(axes, run, pictures, SKY if run.trace.has("est_x_m") else VERMILLION)

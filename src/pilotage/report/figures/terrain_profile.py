@@ -61,6 +61,10 @@ def hazard_distance_figure(run: RunData) -> Illustration:
     trace = run.trace
     if not trace.has("hazard_distance_m") or not _leads_on(trace["distance_m"]):
         return Illustration(slug, title, "", "There is no path to measure along.")
+    if not np.isfinite(trace["hazard_distance_m"]).any():
+        return Illustration(
+            slug, title, "", "No hazard lies so near to the path that its distance is measured."
+        )
     unit, s = _distances(run)
     figure, (axes,) = stacked_axes(["Distance from the nearest hazard's edge [m]"], (130.0,))
     away = trace["hazard_distance_m"]

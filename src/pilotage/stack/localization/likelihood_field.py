@@ -25,6 +25,14 @@ INDEPENDENT_SHARE = 0.25
 VAGUE_M = 0.2
 """Of beams that are told no better than this many end beside another wall than they met: the field errs, and
 in every scan from there alike."""
+THIN_STDS, THIN_SHARE, ALONG_M, PARALLEL = 3.0, 0.25, 0.1, 0.98
+"""Where so large a share of the walls has its other face within so many standard deviations of a beam, ends
+are nearer to that face than to the one they met, in every scan from there alike; looked at so far apart, for
+faces whose directions have this cosine at least."""
+SAME_FACE_M = 1e-3
+"""Faces no farther apart are one, drawn in pieces."""
+MOST_SAMPLES = 50_000
+"""Of a map's walls; longer ones are looked at farther apart."""
 ALIKE_M, LEAST_MOVE_M = 3.0, 0.03
 """Path over which the cells in sight, and so their errors, become others; who stands still counts as one who
 moves a little: people and noise differ from scan to scan."""
@@ -88,7 +96,11 @@ class LikelihoodField:
                 "particle-filter: a scanner without noise leaves the filter no measurement variance; "
                 "set stack.localizer.range_var_m2 or field_std_m above 0"
             )
-        self.errs_alike = on_cells or std_m > VAGUE_M
+        self.errs_alike = (
+            on_cells
+            or std_m > VAGUE_M
+            or thin_share(chart.reflectors.segments_m, THIN_STDS * std_m) > THIN_SHARE
+        )
         self.independent_share = INDEPENDENT_SHARE if self.errs_alike else 1.0
         self._step_m = std_m / TABLE_PER_STD
         inside = round(half_m / self._step_m)
@@ -158,6 +170,33 @@ class LikelihoodField:
     def distances_m(self, points: FloatArray) -> FloatArray:
         """(K,) from points (K, 2) of the map frame to the nearest wall or occupied cell."""
         return np.maximum(self._nearest.at(points) - self._half_m, 0.0)
+
+
+def thin_share(segments_m: FloatArray, within_m: float) -> float:
+    """Share of the walls' length (S, 4) that has another, parallel face nearer than ``within_m``."""
+    ends = segments_m.reshape(-1, 2, 2)
+    along = ends[:, 1] - ends[:, 0]
+    length_m = np.hypot(along[:, 0], along[:, 1])
+    total_m = float(length_m.sum())
+    if total_m == 0.0:
+        return 0.0
+    counts = np.maximum(1, (length_m / max(ALONG_M, total_m / MOST_SAMPLES)).astype(np.int64))
+    owner = np.repeat(np.arange(len(ends)), counts)
+    number = np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts)
+    share = (number + 0.5) / counts[owner]
+    unit = along / np.maximum(length_m, 1e-12)[:, None]
+    samples = ends[owner, 0] + share[:, None] * along[owner]
+    beside = np.zeros(len(samples), np.bool_)
+    # Just beside a sample, for another's samples lie up to half their distance farther along.
+    reach_m = math.hypot(within_m, 0.5 * float((length_m / counts).max()))
+    pairs = scipy.spatial.cKDTree(samples).query_pairs(reach_m, output_type="ndarray")
+    first, second = owner[pairs[:, 0]], owner[pairs[:, 1]]
+    apart = samples[pairs[:, 1]] - samples[pairs[:, 0]]
+    across_m = np.abs(unit[first, 0] * apart[:, 1] - unit[first, 1] * apart[:, 0])
+    parallel = np.abs((unit[first] * unit[second]).sum(axis=1)) > PARALLEL
+    thin = (first != second) & parallel & (across_m < within_m) & (across_m > SAME_FACE_M)
+    beside[pairs[thin].ravel()] = True
+    return float((beside * (length_m / counts)[owner]).sum()) / total_m
 
 
 _NEAREST: OncePerMap[NearestObstacles] = OncePerMap()
