@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis, YAxis
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from rich.console import Console
 from scipy.stats import chi2
@@ -31,7 +32,7 @@ from pilotage.report.figures.consistency import _statistic, chi_square_band
 from pilotage.report.figures.covariance import covariance_figure
 from pilotage.report.figures.layers import ellipse_outlines
 from pilotage.report.figures.map import map_figure
-from pilotage.report.figures.map_view import view_limits
+from pilotage.report.figures.map_view import map_axes, view_limits
 from pilotage.report.figures.placing import LabelPlacer, along
 from pilotage.report.headline import headline
 from pilotage.report.light_axes import LightAxes
@@ -199,6 +200,29 @@ def test_map_shows_the_whole_floor_or_the_part_that_matters(tmp_path: Path) -> N
     assert part[0] > -20.0
     assert part[3] < 30.0
     assert "Only the part of the floor around the run is shown." in page_of(run)
+
+
+@pytest.mark.parametrize(
+    "limits",
+    [
+        (0.0, 0.0, 30.0, 25.0),
+        (-10.0, -10.4, 10.0, 10.4),
+        (-3.0, -11.0, 9.0, -8.4),
+        (-9000.0, -12500.0, 9000.0, -500.0),
+        (499000.0, 4649000.0, 499800.0, 4649900.0),
+    ],
+)
+def test_numbers_and_label_of_the_maps_axis_lie_in_the_figure(
+    limits: tuple[float, float, float, float],
+) -> None:
+    """Numbers such as -10.0 pushed the label half out of it."""
+    with style.drawing_style():
+        figure, axes, _ = map_axes(limits)
+        canvas = FigureCanvasAgg(figure)
+        canvas.draw()
+        seen = axes.yaxis.get_tightbbox(canvas.get_renderer())
+    assert seen is not None
+    assert 0.0 <= seen.x0 <= 12.0
 
 
 def test_values_nearly_all_of_which_are_equal_make_a_histogram_of_few_bars() -> None:

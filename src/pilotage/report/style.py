@@ -49,6 +49,8 @@ FAINT = "#9aa5b1"
 GRID = "#e4e8ec"
 SHADE = "#e3e7ec"
 
+TICK_PT = 8.5
+"""Size of the numbers beside axes."""
 WIDTH_PT = 720.0
 """All figures are drawn this wide and scale with the page."""
 _LEFT_PT, _RIGHT_PT, _TOP_PT, _BOTTOM_PT, _GAP_PT = 50.0, 10.0, 20.0, 32.0, 24.0
@@ -87,8 +89,8 @@ _RC: Any = {
     "ytick.color": FAINT,
     "xtick.labelcolor": MUTED,
     "ytick.labelcolor": MUTED,
-    "xtick.labelsize": 8.5,
-    "ytick.labelsize": 8.5,
+    "xtick.labelsize": TICK_PT,
+    "ytick.labelsize": TICK_PT,
     "xtick.major.size": 3.0,
     "ytick.major.size": 0.0,
     "ytick.minor.size": 0.0,

@@ -13,12 +13,15 @@ from pilotage.records.run_data import RunData
 from pilotage.report.figures import layers
 from pilotage.report.figures.grid import known_corners
 from pilotage.report.light_axes import LightAxes
-from pilotage.report.style import WIDTH_PT
+from pilotage.report.style import TICK_PT, WIDTH_PT
 
 Limits: TypeAlias = tuple[float, float, float, float]
 """x_min, y_min, x_max, y_max in metres."""
 
 _LEFT_PT, _RIGHT_PT, _TOP_PT, _BOTTOM_PT = 34.0, 6.0, 6.0, 30.0
+_AXIS_LABEL_PT = 18.5
+_DIGIT_EM, _NARROW_EM, _WIDE_EM = 0.64, 0.32, 0.84
+"""Widths of a digit, a point and a minus, in the font's size."""
 _MOST_HEIGHT_PT, _LEAST_HEIGHT_PT = 900.0, 150.0
 # A run that needs less than this share of the floor is shown with its surroundings only.
 _SMALL_PART = 0.55
@@ -85,8 +88,26 @@ def _extent(points: FloatArray, relative: float, least_m: float) -> Limits | Non
 
 def map_axes(limits: Limits) -> tuple[Figure, Axes, float]:
     """Return a figure whose axes have equal scales and fill it, and its points a metre."""
+    figure, axes, scale = _axes_beside(limits, _LEFT_PT)
+    left_pt = room_at_left_pt(axes)
+    return (figure, axes, scale) if left_pt <= _LEFT_PT else _axes_beside(limits, left_pt)
+
+
+def room_at_left_pt(axes: Axes) -> float:
+    """What the axis' label and the numbers beside it take, so that neither is cut off."""
+    numbers = axes.yaxis.get_major_formatter().format_ticks(axes.yaxis.get_majorticklocs().tolist())
+    return _AXIS_LABEL_PT + TICK_PT * max((sum(map(_width_em, number)) for number in numbers), default=0.0)
+
+
+def _width_em(character: str) -> float:
+    if character in ".,":
+        return _NARROW_EM
+    return _WIDE_EM if character == "\N{MINUS SIGN}" else _DIGIT_EM
+
+
+def _axes_beside(limits: Limits, left_pt: float) -> tuple[Figure, Axes, float]:
     x_min, y_min, x_max, y_max = limits
-    width = WIDTH_PT - _LEFT_PT - _RIGHT_PT
+    width = WIDTH_PT - left_pt - _RIGHT_PT
     scale = min(width / (x_max - x_min), _MOST_HEIGHT_PT / (y_max - y_min))
     height = max(scale * (y_max - y_min), _LEAST_HEIGHT_PT)
     # What is too tall or too flat for the page gets room at its sides instead of a distortion.
@@ -94,7 +115,7 @@ def map_axes(limits: Limits) -> tuple[Figure, Axes, float]:
     total = height + _TOP_PT + _BOTTOM_PT
     figure = Figure(figsize=(WIDTH_PT / 72.0, total / 72.0))
     axes = figure.add_axes(
-        (_LEFT_PT / WIDTH_PT, _BOTTOM_PT / total, width / WIDTH_PT, height / total), axes_class=LightAxes
+        (left_pt / WIDTH_PT, _BOTTOM_PT / total, width / WIDTH_PT, height / total), axes_class=LightAxes
     )
     axes.set_xlim(x_min - x_margin, x_max + x_margin)
     axes.set_ylim(y_min - y_margin, y_max + y_margin)

@@ -16,6 +16,7 @@ from pilotage.records.numbers import number
 from pilotage.records.run_data import RunData
 from pilotage.records.terrain import Picture, TerrainPictures
 from pilotage.report import quantities
+from pilotage.report.figures.map_view import room_at_left_pt
 from pilotage.report.figures.terrain_estimate import (
     POSITION_COVARIANCE,
     estimate_layers,
@@ -133,18 +134,24 @@ def ground_axes(
     if low is None or high is None:
         rim = corners(pictures)
         low, high = rim.min(axis=0), rim.max(axis=0)
-    width = WIDTH_PT - _LEFT_PT - _RIGHT_PT
+    unit = "km" if unit_of(pictures) > 1.0 else "m"
+    figure, axes = _axes_beside(low, high, _LEFT_PT, unit)
+    left_pt = room_at_left_pt(axes)
+    return (figure, axes) if left_pt <= _LEFT_PT else _axes_beside(low, high, left_pt, unit)
+
+
+def _axes_beside(low: FloatArray, high: FloatArray, left_pt: float, unit: str) -> tuple[Figure, Axes]:
+    width = WIDTH_PT - left_pt - _RIGHT_PT
     height = min(_MOST_HEIGHT_PT, width * (high[1] - low[1]) / (high[0] - low[0]))
     total = height + _TOP_PT + _BOTTOM_PT
     figure = Figure(figsize=(WIDTH_PT / 72.0, total / 72.0))
-    axes = figure.add_axes((_LEFT_PT / WIDTH_PT, _BOTTOM_PT / total, width / WIDTH_PT, height / total))
+    axes = figure.add_axes((left_pt / WIDTH_PT, _BOTTOM_PT / total, width / WIDTH_PT, height / total))
     axes.set_aspect("equal")
     axes.set_xlim(low[0], high[0])
     axes.set_ylim(low[1], high[1])
     axes.grid(visible=False)
-    unit = unit_of(pictures)
-    axes.set_xlabel(f"x [{'km' if unit > 1.0 else 'm'}]", labelpad=2.0)
-    axes.set_ylabel(f"y [{'km' if unit > 1.0 else 'm'}]", labelpad=2.0)
+    axes.set_xlabel(f"x [{unit}]", labelpad=2.0)
+    axes.set_ylabel(f"y [{unit}]", labelpad=2.0)
     return figure, axes
 
 

@@ -46,7 +46,7 @@ MAPPED_TOLERANCE_M = 0.02
 SETTING_OUT_M = 0.1
 """A plan that begins with a turn on the spot is still at its beginning."""
 
-SAME_PLACE_M = 0.3
+SAME_PLACE_M = 0.15
 """A plan made so near by would be the same again."""
 
 SOMEBODY_M = 2.0
