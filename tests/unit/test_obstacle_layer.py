@@ -53,6 +53,46 @@ def test_who_walks_on_is_forgotten_and_what_stands_is_kept(forget_scans: int) ->
         assert count == both  # the laser does not see it
 
 
+def test_a_laser_that_is_wrong_now_and_then_puts_nothing_on_the_map() -> None:
+    """A twentieth of its beams, anywhere nearer than what they meet: in a minute many a cell is hit thrice."""
+    chart, rng = WorldMap("floor", (-7.0, -7.0, 7.0, 7.0)), np.random.default_rng(0)
+    angles = LIDAR.beam_angles_rad()
+    post = np.array([[2.0, 0.5, 0.1]])
+    truly_m = fan_ranges(0.0, 0.0, float(angles[0]), LIDAR.beam_step_rad, 271, 8.0, WALLS, post)
+    layer, keeps = (ObstacleLayer(ObstacleLayerConfig(forget_scans=scans), ROBOT, chart) for scans in (3, 0))
+    most = 0
+    for k in range(600):
+        wrong = rng.random(271) < 0.05
+        ranges_m = np.where(wrong, np.maximum(truly_m - rng.uniform(0.0, 3.0, 271), 0.0), truly_m)
+        for one in (layer, keeps):
+            one.step(Readings(0.1 * k, {"lidar": LidarScan(ranges_m)}), BELIEF)
+        most = max(most, int((np.hypot(*(layer.circles_m[:, :2] - post[0, :2]).T) > 0.3).sum()))
+    assert most == 0
+    assert len(layer.circles_m) > 2
+    assert (np.hypot(*(keeps.circles_m[:, :2] - post[0, :2]).T) > 0.3).sum() > 5
+
+
+def test_nothing_stands_in_the_robot() -> None:
+    layer = ObstacleLayer(ObstacleLayerConfig(), ROBOT, WorldMap("floor", (-7.0, -7.0, 7.0, 7.0)))
+    ranges_m = np.full(271, 5.0)
+    ranges_m[::9] = 0.0
+    for k in range(4):
+        layer.step(Readings(0.1 * k, {"lidar": LidarScan(ranges_m)}), BELIEF)
+        assert not (np.hypot(*layer.circles_m[:, :2].T) < 1.0).any()
+
+
+def test_a_pole_that_few_beams_meet_is_believed_all_the_same() -> None:
+    """2 cm thick, 2.5 m away, between beams 4.4 cm apart there: the robot comes nearer."""
+    chart, pole = WorldMap("floor", (-7.0, -7.0, 7.0, 7.0)), np.array([[2.5, 0.02, 0.01]])
+    layer, angles = ObstacleLayer(ObstacleLayerConfig(), ROBOT, chart), LIDAR.beam_angles_rad()
+    for k in range(40):
+        x = 0.03 * k
+        ranges_m = fan_ranges(x, 0.0, float(angles[0]), LIDAR.beam_step_rad, 271, 8.0, WALLS, pole)
+        belief = Belief(Pose2(x, 0.0, 0.0), 1e-6 * np.eye(3))
+        layer.step(Readings(0.1 * k, {"lidar": LidarScan(ranges_m)}), belief)
+    assert (np.hypot(*(layer.circles_m[:, :2] - pole[0, :2]).T) < 0.05).any()
+
+
 def test_only_what_all_beams_pass_is_seen_through() -> None:
     disc = np.array([[2.0, 0.0, 0.03]])
 

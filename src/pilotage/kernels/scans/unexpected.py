@@ -53,28 +53,32 @@ def unexplained_points(
 
 
 @kernel
-def confirm_cells(
+def count_in_cells(
     points: FloatArray,
     x: float,
     y: float,
     reach: float,
+    body: FloatArray,
     hits: IntArray,
     sums: FloatArray,
     x0: float,
     y0: float,
     cell: float,
     threshold: int,
-) -> FloatArray:
+) -> IntArray:
     """Count points (K, 2) into ``hits`` (ny, nx) and add them to ``sums`` (ny, nx, 2), both in place.
 
-    Only those nearer to (x, y) than ``reach``.
-    Returns the mean points (C, 2) of the cells whose count reaches ``threshold`` by this call.
+    Only those nearer to (x, y) than ``reach``, none where ``threshold`` are counted already, and none within
+    the disc (x, y, radius) ``body``.
+    Returns the cells (C, 2), row and column, that had none before.
     """
     ny, nx = hits.shape
-    means = np.empty((points.shape[0], 2))
+    cells = np.empty((points.shape[0], 2), np.int64)
     count = 0
     for k in range(points.shape[0]):
         if math.hypot(points[k, 0] - x, points[k, 1] - y) >= reach:
+            continue
+        if math.hypot(points[k, 0] - body[0], points[k, 1] - body[1]) < body[2]:
             continue
         col = math.floor((points[k, 0] - x0) / cell)
         row = math.floor((points[k, 1] - y0) / cell)
@@ -83,11 +87,11 @@ def confirm_cells(
         hits[row, col] += 1
         sums[row, col, 0] += points[k, 0]
         sums[row, col, 1] += points[k, 1]
-        if hits[row, col] == threshold:
-            means[count, 0] = sums[row, col, 0] / threshold
-            means[count, 1] = sums[row, col, 1] / threshold
+        if hits[row, col] == 1:
+            cells[count, 0] = row
+            cells[count, 1] = col
             count += 1
-    return means[:count].copy()
+    return cells[:count].copy()
 
 
 @kernel

@@ -35,7 +35,8 @@ class ObstacleLayerConfig(Config):
     """Radius of the disc that a believed cell puts on the map, around the mean of its hits."""
     hits: int = Field(default=3, ge=1, le=1000)
     forget_scans: int = Field(default=3, ge=0, le=1000)
-    """What so many scans in a row see through is forgotten: it went away; 0 keeps everything for ever."""
+    """What so many scans in a row see through is forgotten, and the hits of what is not believed yet: it went
+    away, or never was; 0 keeps everything for ever."""
     forget_beyond_m: Positive = 0.15
     """Seen through: every beam that could have met it ends at least so far behind it. Nearer to a wall than
     this nothing would ever be forgotten."""
@@ -48,7 +49,8 @@ class ObstacleLayer:
     """Cells of a grid over the known map, each turned into a disc around its hits once it is believed.
 
     What it learns it keeps until its beams go through where that stood: somebody who walks on is forgotten,
-    an obstacle that went away out of sight stays on the map. Points within the tolerance of a known wall are
+    an obstacle that went away out of sight stays on the map. Hits count until then as well: a laser that is
+    wrong now and then hits every cell in the end. Points within the tolerance of a known wall are
     taken for the wall, so an obstacle flush with a wall is seen only where it stands out.
     """
 
@@ -67,6 +69,7 @@ class ObstacleLayer:
         self._sums = np.zeros((*shape, 2))
         self._origin = (xmin, ymin)
         self._inside_m = INSIDE * robot.footprint.inner_radius_m
+        self._cells: IntArray = np.zeros((0, 2), dtype=np.int64)
         self._passed: IntArray = np.zeros(0, dtype=np.int64)
         self.circles_m: FloatArray = np.zeros((0, 3))
 
@@ -76,62 +79,78 @@ class ObstacleLayer:
         if not isinstance(scan, LidarScan):
             return False
         config, seen = self._config, self.unexplained.of(scan, belief)
-        if config.forget_scans and len(self.circles_m):
-            self._forget(scan.ranges_m, seen, belief.pose, self._looked_through(readings, seen, belief.pose))
+        if config.forget_scans and len(self._cells):
+            self._forget(readings, scan.ranges_m, seen, belief.pose)
         if seen.points_m.shape[0] == 0:
             return False
-        means = unexpected.confirm_cells(
+        begun = unexpected.count_in_cells(
             seen.points_m,
             seen.x_m,
             seen.y_m,
             self._reach_m,
+            np.array([belief.pose.x_m, belief.pose.y_m, self._inside_m]),
             self._hits,
             self._sums,
             *self._origin,
             config.cell_m,
             config.hits,
         )
-        if means.shape[0] == 0:
-            return False
-        discs = np.column_stack([means, np.full(means.shape[0], config.disc_m)])
-        self.circles_m = np.concatenate([self.circles_m, discs])
-        self._passed = np.append(self._passed, np.zeros(len(discs), dtype=np.int64))
-        return True
+        self._cells = np.concatenate([self._cells, begun])
+        self._passed = np.append(self._passed, np.zeros(len(begun), dtype=np.int64))
+        believed = len(self.circles_m)
+        self._believe()
+        return len(self.circles_m) > believed
 
-    def _looked_through(self, readings: Readings, seen: Unexplained, pose: Pose2) -> BoolArray:
+    def _believe(self) -> None:
+        """What was hit often enough is on the map."""
+        rows, columns = self._cells.T
+        enough = self._hits[rows, columns] >= self._config.hits
+        self.circles_m = self._discs(self._cells[enough])
+
+    def _discs(self, cells: IntArray) -> FloatArray:
+        """(N, 3) discs around the hits of cells (N, 2)."""
+        rows, columns = cells.T
+        means = self._sums[rows, columns] / self._hits[rows, columns, None]
+        return np.column_stack([means, np.full(len(cells), self._config.disc_m)])
+
+    def _looked_through(
+        self, discs: FloatArray, readings: Readings, seen: Unexplained, pose: Pose2
+    ) -> BoolArray:
         """Which discs (M,) one of several lasers saw through itself; all, where the scan is of one.
 
         From between them a beam passes places where none of them looks.
         """
-        looked = np.full(len(self.circles_m), not self._lasers)
+        looked = np.full(len(discs), not self._lasers)
         for name, sheet in self._lasers:
             scan = readings.by_sensor.get(name)
             if isinstance(scan, LidarScan):
                 at = pose.compose(sheet.mount.pose)
                 first_rad = at.theta_rad + float(sheet.beam_angles_rad()[0])
                 ray = (at.x_m, at.y_m, first_rad)
-                looked |= self._seen_through(scan.ranges_m, sheet, ray, sheet.max_range_m, seen)
+                looked |= self._seen_through(discs, scan.ranges_m, sheet, ray, sheet.max_range_m, seen)
         return looked
 
-    def _forget(self, ranges_m: FloatArray, seen: Unexplained, pose: Pose2, looked: BoolArray) -> None:
+    def _forget(self, readings: Readings, ranges_m: FloatArray, seen: Unexplained, pose: Pose2) -> None:
         """Take off the map what has been seen through often enough; it may be found there again."""
-        config = self._config
+        config, discs = self._config, self._discs(self._cells)
         ray = (seen.x_m, seen.y_m, seen.first_rad)
-        through = self._seen_through(ranges_m, self._sheet, ray, self._reach_m, seen)
-        self._passed = np.where(through & looked, self._passed + 1, 0)
+        through = self._seen_through(discs, ranges_m, self._sheet, ray, self._reach_m, seen)
+        through &= self._looked_through(discs, readings, seen, pose)
+        self._passed = np.where(through, self._passed + 1, 0)
         # Where the robot stands nothing else does: somebody stood there.
-        away_m = np.hypot(self.circles_m[:, 0] - pose.x_m, self.circles_m[:, 1] - pose.y_m)
+        away_m = np.hypot(discs[:, 0] - pose.x_m, discs[:, 1] - pose.y_m)
         gone = (self._passed >= config.forget_scans) | (away_m < self._inside_m)
         if not gone.any():
             return
-        # A disc lies at the mean of its cell's points, so in its cell.
-        columns, rows = ((self.circles_m[gone, :2] - self._origin) / config.cell_m).astype(np.int64).T
+        rows, columns = self._cells[gone].T
         self._hits[rows, columns] = 0
         self._sums[rows, columns] = 0.0
-        self.circles_m, self._passed = self.circles_m[~gone], self._passed[~gone]
+        self._cells, self._passed = self._cells[~gone], self._passed[~gone]
+        self._believe()
 
     def _seen_through(
         self,
+        discs: FloatArray,
         ranges_m: FloatArray,
         lidar: LidarConfig,
         first_ray: tuple[float, float, float],
@@ -140,7 +159,7 @@ class ObstacleLayer:
     ) -> BoolArray:
         """Which discs (M,) within reach a scan shows not to be there, its first beam's pose told."""
         return unexpected.seen_through(
-            self.circles_m,
+            discs,
             ranges_m,
             *first_ray,
             lidar.beam_step_rad,
