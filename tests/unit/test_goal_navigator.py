@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import STOP, Goal, Pose2, Twist
-from pilotage.experiments.mission import mission_of
+from pilotage.experiments.mission import load_mission, mission_of
 from pilotage.experiments.run import run_mission
 from pilotage.kernels.geometry import chain
 from pilotage.maps.segment_map import SegmentMap
@@ -179,6 +179,15 @@ def test_a_goal_in_the_wall_fails_before_the_start() -> None:
     assert "goal" in reason
     assert [event.kind for event in told.journal.events] == ["failed"]
     assert stack.step(Readings(0.1, {})) == Twist(0.0, 0.0)
+
+
+def test_who_gives_up_says_why_there_is_no_path() -> None:
+    """It said that it had backed out, and not that something stands on its goal."""
+    obstacle = "world.obstacles=[{kind: circle, centre_m: [1.65, 27.0], radius_m: 0.15}]"
+    mission = load_mission("museum-1", (obstacle, "stack.navigator.max_replans=1"))
+    reason = str(run_mission(mission, save=False).metrics["reason"])
+    assert reason.startswith("stuck: gave up after 1 replans")
+    assert "planning found goal blocked (the goal (2, 27) is" in reason
 
 
 def test_a_goal_that_the_planners_clearance_does_not_leave_is_driven_to() -> None:

@@ -54,7 +54,7 @@ def test_who_walks_on_is_forgotten_and_what_stands_is_kept(forget_scans: int) ->
 
 
 def test_a_laser_that_is_wrong_now_and_then_puts_nothing_on_the_map() -> None:
-    """A twentieth of its beams, anywhere nearer than what they meet: in a minute many a cell has three hits."""
+    """A twentieth of its beams, anywhere nearer than what they meet: many a cell is hit thrice in the end."""
     chart, rng = WorldMap("floor", (-7.0, -7.0, 7.0, 7.0)), np.random.default_rng(0)
     angles = LIDAR.beam_angles_rad()
     post = np.array([[2.0, 0.5, 0.1]])

@@ -72,6 +72,8 @@ class Context:
         Places still to be visited, the current one first.
     tries, again
         New plans for which nobody who walks can be blamed; those in a row that were made where the last was.
+    found_no_path
+        Why the last new plan found none, in words.
     trail
         Poses since the last plan that did not start on them, for an escape to go back along.
     """
@@ -110,6 +112,7 @@ class Context:
         self._planned_s = 0.0
         self._waited_at, self._waited = (math.inf, math.inf), 0
         self.tries = self.again = 0
+        self.found_no_path = ""
         self.turn_rate_rad_s = min(TURN_RATE_RAD_S, robot.motion.top_turn_rate_rad_s)
         self.reactive, self._mapper, self.escape = parts.reactive, parts.mapper, parts.escape
         self.own_map, self.plan = own_map, plan

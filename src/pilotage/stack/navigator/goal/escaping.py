@@ -156,8 +156,9 @@ def replan(context: Context, resumes: State, pose: Pose2, why: str) -> Move:
         remedy = (
             "" if context.escape is not None else ", and the stack has no escape (stack.escape: back-out)"
         )
-        gave_up = f"stuck: gave up after {context.tries} replans"
-        return fail(context, f"{gave_up}, the last because {why}{remedy}")
+        gave_up = f"stuck: gave up after {context.tries} replans, the last because {why}"
+        found = f"; planning found {context.found_no_path}" if context.found_no_path else ""
+        return fail(context, f"{gave_up}{found}{remedy}")
     context.again = context.again + 1 if context.planned_here(pose) else 0
     if context.again >= AGAIN and context.escape is not None:
         context.again = 0
@@ -170,7 +171,8 @@ def replan(context: Context, resumes: State, pose: Pose2, why: str) -> Move:
 def set_out(context: Context, resumes: State, pose: Pose2, kind: str, why: str) -> Move:
     """Stop and plan to the current goal; back out where there is no path from here."""
     result = context.make_plan(pose, context.clearances_m(pose))
+    context.found_no_path = "" if result.path is not None else f"{result.status} ({result.reason})"
     if result.path is None:
-        return begin_escape(context, resumes, pose, f"replanning found {result.status} ({result.reason})")
+        return begin_escape(context, resumes, pose, f"replanning found {context.found_no_path}")
     context.take_plan(kind, why)
     return Move(resumes, STOP)
