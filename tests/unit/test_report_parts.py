@@ -218,7 +218,7 @@ def test_numbers_and_label_of_the_maps_axis_lie_in_the_figure(
     """Numbers such as -10.0 pushed the label half out of it."""
     with style.drawing_style():
         figure, axes, _ = map_axes(limits)
-        canvas = FigureCanvasAgg(figure)
+        canvas: Any = FigureCanvasAgg(figure)
         canvas.draw()
         seen = axes.yaxis.get_tightbbox(canvas.get_renderer())
     assert seen is not None
