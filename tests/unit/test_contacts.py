@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pilotage.core.types import Pose2, Twist
+from pilotage.core.types import Pose2, Twist, WheelSpeeds
 from pilotage.experiments.loop import simulate
 from pilotage.experiments.mission import mission_of
 from pilotage.maps.occupancy_grid import OccupancyGrid
 from pilotage.maps.world_map import WorldMap
 from pilotage.models.footprint import Footprint
+from pilotage.models.motion.wheel_drive import WheelDriveConfig
 from pilotage.sim.source import Simulator
 from pilotage.sim.worlds.world import World
 from support.missions import drive
@@ -71,3 +72,18 @@ def test_a_run_says_whom_it_touched_in_its_event_and_its_reason() -> None:
         "the body touched an obstacle"
     ]
     assert ") with an obstacle after " in run.ending
+
+
+def test_whoever_is_driven_into_by_wheels_that_spin_on_is_hit_and_told() -> None:
+    """The centre stays where the step began, a few millimetres short of him: a wall far away was told."""
+    motion = WheelDriveConfig(wheel_radius_m=0.05, wheel_separation_m=0.3, max_wheel_speed_rad_s=10.0)
+    people = [Walker(lambda _t: (1.013, 0.0))]
+    world = World.of(EMPTY, obstacle_circles_m=POST + 9.0)
+    here = robot(motion=motion, footprint=Footprint.disc(0.25), start=Pose2(0.0, 0.0, 0.0), name="here")
+    sim = Simulator(world, [here], 0.1, people, ["walker"])
+    for _ in range(30):
+        sim.step([WheelSpeeds(8.0, 8.0)])
+    assert sim.bodies[0].collisions == 1
+    assert sim.crowd is not None
+    assert sim.crowd.encounters(0).collisions == 1
+    assert sim.bodies[0].touched == ("person walker",)

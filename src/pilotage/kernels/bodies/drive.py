@@ -30,7 +30,8 @@ from pilotage.kernels.jit import kernel
 ) = range(13)
 """Entries of a body's state: pose; clearance from everything and from what does not move (m); 1 while it
 touches, 2 where another body ran into it; how often it ran into something; path of the centre (m); of the
-last step forward and lateral distance, angle, 1 where something stopped it, 1 where that was another body."""
+last step forward and lateral distance, angle, 1 where something stopped it, 1 where that was another body
+and by how much (m) the centre stays short of it, its wheels spinning on."""
 STATE_SIZE = 13
 
 CONTACT_TOLERANCE_M = 1e-9
@@ -218,12 +219,13 @@ def drive(
         stopped = part < 1.0
         if stopped:
             ahead, ahead_y, ahead_theta = turned_part(x, y, theta, distance, lateral, angle, part)
+            short = part * math.hypot(distance, lateral) if spins_on else 0.0
             if spins_on:
                 distance, lateral, part = 0.0, 0.0, 1.0
                 if outline[0].shape[0] > 0:
                     part = first_contact(x, y, theta, 0.0, 0.0, angle, clearance, outline, fixed, others, own)
             if others_clearance(ahead, ahead_y, ahead_theta, outline, others, own) < CONTACT_M:
-                state[BLOCKER] = 1.0
+                state[BLOCKER] = 1.0 + short
         x, y, theta = turned_part(x, y, theta, distance, lateral, angle, part)
         state[FIXED_CLEARANCE] = fixed_clearance(x, y, theta, outline, fixed)
         gap = others_clearance(x, y, theta, outline, others, own)

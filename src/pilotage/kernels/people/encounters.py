@@ -157,6 +157,8 @@ def meet_people(
             c, s = math.cos(state[THETA]), math.sin(state[THETA])
             clear = outline_clearance(state[X], state[Y], c, s, shape, radii[r], no_sides, disc)
             nearest = min(nearest, clear)
+            # Of one whose wheels spin on the centre stays short of whom it drove into.
+            touched = touched or clear < state[BLOCKER] - 1.0 + CONTACT_M
             if not touched:
                 between[r, p] = APART
                 continue
