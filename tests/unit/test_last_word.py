@@ -10,10 +10,13 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from pilotage.core.types import STOP, Twist
 from pilotage.experiments.mission import mission_of
 from pilotage.experiments.run import run_mission
+from pilotage.kernels.bodies.beam_contact import touches_an_end
 from pilotage.kernels.scans.rays import fan_ranges
 from pilotage.models.footprint import Footprint
 from pilotage.models.motion.differential_drive import DifferentialDriveConfig
@@ -22,6 +25,7 @@ from pilotage.sensors.readings import LidarScan, OdometryIncrement, Reading, Rea
 from pilotage.sensors.sensor import Mount, SensorConfig
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 from pilotage.stack.control.last_word import LastWord
+from pilotage.stack.control.scan_guard import LaserView
 from pilotage.stack.control.wander import WanderConfig
 from pilotage.stack.interface import Belief
 from pilotage.stack.navigator.wandering import Wandering
@@ -29,6 +33,7 @@ from support.robots import told_of
 from support.worlds import alone, robot
 
 NO_DISCS = np.zeros((0, 3))
+RECTANGLE = np.array([[0.255, 0.215], [-0.255, 0.215], [-0.255, -0.215], [0.255, -0.215]])
 AHEAD = [0.37, -3.0, 0.37, 3.0]
 BESIDE, POST = [-3.0, 0.306, 3.0, 0.306], [-0.002, 0.3, 0.002, 0.3]
 AHEAD_M_S, BACK_M_S = Twist(0.5, 0.0), Twist(-0.5, 0.0)
@@ -354,3 +359,25 @@ def test_curve_goes_on_where_somebody_has_gone(tmp_path: Path) -> None:
     assert found.success, found.metrics["reason"]
     alone_s = run_mission(mission_of(on_a_grid(tmp_path)), save=False).metrics["duration_s"]
     assert float(str(found.metrics["duration_s"])) > float(str(alone_s)) + 1.0
+
+
+@given(
+    st.floats(0.0, 0.02), st.floats(0.6, 1.2), st.floats(0.2, 0.5 * math.pi - 0.2), st.sampled_from((-1, 1))
+)
+@settings(max_examples=200)
+def test_corners_between_beams_are_not_driven_into(
+    depth_m: float, ahead_m: float, turned_rad: float, side: int
+) -> None:
+    """The corner of a box sticks out beyond the ends of beams 4 degrees apart; a robot clipped one."""
+    sheet = LidarConfig(beams=90, field_of_view_rad=2.0 * math.pi * 89.0 / 90.0, range_var_m2=0.0)
+    cosine, sine = math.cos(turned_rad), math.sin(turned_rad)
+    box = np.array([[cosine, -sine], [sine, cosine]]) @ np.array([[0.0, 0.3, 0.3, 0.0], [0.0, 0.0, 0.3, 0.3]])
+    # Its corner reaches so deep into what the robot's side sweeps.
+    box += np.array([[ahead_m - box[0].min()], [0.215 - depth_m - box[1].min()]])
+    box[1] *= side
+    sides = np.column_stack([box.T, np.roll(box, -1, axis=1).T])
+    touches = touches_an_end(
+        scan_of(sheet, *sides.tolist()).ranges_m, LaserView("laser", sheet).directions, (0.0, 0.0), 3.0,
+        (0.0, 0.0, 0.0), (1.2, 0.0, 0.0), 120, RECTANGLE, 0.34, 0.01, sheet.beam_step_rad, 0.05, 0.0,
+    )  # fmt: skip
+    assert touches

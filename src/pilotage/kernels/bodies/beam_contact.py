@@ -84,10 +84,11 @@ def touches_an_end(
     corners: FloatArray,
     radius: float,
     margin: float,
+    between: float,
     own: float,
     same: float,
 ) -> bool:
-    """Whether a confirmed end of a beam comes nearer than ``margin``, and nearer than it is, on a move.
+    """Whether a confirmed end of a beam comes nearer than its margin, and nearer than it is, on a move.
 
     Each end is judged by itself: one that is near already, and gets no nearer, says nothing of the others.
     Deep in the outline nothing stands: what seems to is the robot itself, or dirt on the laser.
@@ -106,6 +107,9 @@ def touches_an_end(
         Poses on the way that are looked at.
     corners, radius
         (K, 2) of a polygon, none of a disc; of the disc around the axle that holds it.
+    margin, between
+        An end is kept as far away as this and that share of its range: what ends between a beam and the next,
+        which passes it, sticks out by their distance at most.
     own
         Deeper in the outline than this is deep.
     same
@@ -124,13 +128,14 @@ def touches_an_end(
         if not ranges[k] < reach:
             continue
         away = _range_of(ranges, k, same)
+        kept = margin + between * away
         px, py = mount[0] + away * directions[k, 0], mount[1] + away * directions[k, 1]
-        if (px - x0) ** 2 + (py - y0) ** 2 >= (radius + swept + margin) ** 2:
+        if (px - x0) ** 2 + (py - y0) ** 2 >= (radius + swept + kept) ** 2:
             continue
         now = _away(poses[0], px, py, corners, radius)
-        if now < -own or now >= swept + margin:
+        if now < -own or now >= swept + kept:
             continue
-        least = min(margin, now - NEARER_M)
+        least = min(kept, now - NEARER_M)
         i = max(1, math.floor((now - least) / piece))
         while i <= pieces:
             away = _away(poses[i], px, py, corners, radius)

@@ -56,7 +56,7 @@ class LaserView:
         # The nearest of some returns is told too near by about two deviations; a vague laser's are averaged.
         std_m = math.sqrt(sheet.range_var_m2)
         self.margin_m, self.own_m = max(TOUCH_M - 2.0 * std_m, 0.0), OWN_M + 3.0 * std_m
-        self.same_m = SAME_STDS * std_m
+        self.same_m, self.between = SAME_STDS * std_m, sheet.beam_step_rad
         self._scans: list[Scan] = []
 
     def take_in(self, readings: Readings, here: tuple[float, float, float]) -> None:
@@ -80,7 +80,7 @@ class LaserView:
         found, sure_m = [], self._sure_m
         for scan in self._scans:
             x, y, _ = scan.at
-            reach_m = within_m + self._arm_m + math.hypot(here[0] - x, here[1] - y)
+            reach_m = (within_m + self._arm_m + math.hypot(here[0] - x, here[1] - y)) * (1.0 + self.between)
             if scan.nearest_m < reach_m and scan.nearest_m < sure_m:
                 found.append((scan, min(reach_m, sure_m)))
         return found
@@ -174,6 +174,7 @@ class ScanGuard:
                 self._corners_m,
                 self._radius_m,
                 laser.margin_m,
+                laser.between,
                 laser.own_m,
                 laser.same_m,
             ):
