@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from pilotage.core.errors import InputError
-from pilotage.core.types import BoolArray, FloatArray, Goal, Pose2
+from pilotage.core.types import BoolArray, FloatArray, Goal, Pose2, Twist
 from pilotage.evaluation.tasks.sweep import _too_little
 from pilotage.experiments import warm_up
 from pilotage.experiments.build.build import build
@@ -32,6 +32,8 @@ from pilotage.maps.floor import Floor, sweepable
 from pilotage.maps.segment_map import SegmentMap, box_segments
 from pilotage.maps.world_map import WorldMap
 from pilotage.models.footprint import Footprint
+from pilotage.stack.control.last_word import LastWord
+from pilotage.stack.control.own_half import OwnHalf
 from pilotage.stack.navigator.reference import Ends, Reference
 from pilotage.stack.navigator.timed_path import with_turns
 from pilotage.stack.planning.boustrophedon import BoustrophedonConfig, BoustrophedonPlanner
@@ -414,6 +416,29 @@ class TestTask:
         assert len(run.robots[0].plans) >= 2
         assert metrics["success"], metrics["reason"]
 
+    def test_where_it_was_shown_no_room_it_looks_again_in_the_end(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """What a laser showed at one moment shut off a piece of floor for good: it "arrived" with 93 %."""
+        allows = LastWord.allows
+        refused: list[float] = []
+
+        def doubts(self: LastWord, command: Twist) -> bool:
+            if self._t_s >= 20.0 and not refused:
+                refused.append(self._t_s)
+                self.shown_m = np.column_stack([np.full(7, 0.4), np.linspace(-0.3, 0.3, 7)])
+                return False
+            return allows(self, command)
+
+        monkeypatch.setattr(LastWord, "allows", doubts)
+        monkeypatch.setattr(OwnHalf, "sees", lambda self, shown_m: False)  # noqa: ARG005
+        experiment = build(mission_of(copy.deepcopy(MISSIONS["sweep-floor"]), seed=0))
+        run = run_loop(experiment).finished
+        metrics = experiment.task.judge(run).metrics
+        assert refused
+        assert "rest" in [event.kind for event in run.events]
+        assert metrics["success"], metrics["reason"]
+
     def test_who_turns_sluggishly_drives_its_lines_all_the_same(self) -> None:
         """It turned too far, set out askew, was 0.1 m beside lines, and went for the rest three times."""
         values = copy.deepcopy(MISSIONS["sweep-floor"])
@@ -514,7 +539,7 @@ def test_a_reference_stops_where_a_turn_or_a_line_ends() -> None:
     path = np.column_stack([leg, np.zeros(11), np.zeros(11)])
     reference = Reference(with_turns(path, 0.5 * np.pi, 1.0, 0.5, 1.0, 0.1), 0.1)
     assert reference.ends is Ends.NEITHER
-    ended = []
+    ended: list[tuple[Ends, float, float, float]] = []
     while not reference.done:
         reference.rate = 0.7
         reference.step()

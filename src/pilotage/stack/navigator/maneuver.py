@@ -452,11 +452,17 @@ class ManeuverNavigator(LocalizingNavigator):
             self._journal.say(t_s, "arrived", "the plan was driven to its end")
 
     def _goes_for_the_rest(self, t_s: float) -> bool:
-        """Whether what it drove along left something, and there is a path to that."""
+        """Whether what it drove along left something, and there is a path to that.
+
+        Where there is none beside what its lasers showed where it stopped, as if it had not been shown
+        that: a doubtful place shuts a passage for as long as it takes to sweep all else, not for good.
+        """
         if self._trail is None or self._rests == MOST_RESTS:
             return False
         self._rests += 1
         result = self._planned(t_s, rest=True)
+        if not result.covers and self._own_map.forgets():
+            result = self._planned(t_s, rest=True)
         if result.path is None or not result.covers:
             return False
         self._lay_out(result.path)

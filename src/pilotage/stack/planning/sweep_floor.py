@@ -67,8 +67,8 @@ def _within_reach(floor: Floor, inner: Floor, reach_m: float) -> BoolArray:
 def rest_of(whole: Sought, trail: FloatArray, width_m: float, enough: float) -> Sought:
     """What a trail left of the floor, but for the least of it, and the rim beside that.
 
-    Half of what passes are planned to overlap by is left to the robot's error: by its own estimate the trail of
-    a sweep has swept cells that it passed by millimetres too far from.
+    Half of what passes are planned to overlap by is left to the robot's error: by its own estimate it has
+    swept cells that it passed by millimetres too far from.
 
     Parameters
     ----------
