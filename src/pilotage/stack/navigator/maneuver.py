@@ -34,7 +34,7 @@ from pilotage.stack.navigator.navigator import (
     unexplained_of,
 )
 from pilotage.stack.navigator.own_map import OwnMap
-from pilotage.stack.navigator.reference import STANDS, Reference
+from pilotage.stack.navigator.reference import STANDS, Ends, Reference
 from pilotage.stack.navigator.timed_path import laid_out, with_turns
 from pilotage.stack.navigator.trail import Trail
 from pilotage.stack.navigator.wandering import Wandering
@@ -53,8 +53,14 @@ LOOK_S = 2.0
 knows its place."""
 BESIDE_INNER_M = (0.25, 0.2, 0.15, 0.08, 0.04, 0.01)
 """What paths planned for the centre keep beside the outline's inner disc, where they can keep no more."""
-HEADING_PER_S = 3.0
-"""A heading error dies out in so much of a second's inverse while it turns on the spot."""
+HEADING_PER_S, NEARS_PER_S = 3.0, 3.0
+"""A heading error dies out in so much of a second's inverse while it turns on the spot, and what is left of a
+line where it stops at its end."""
+TURN_ACCELERATION_SHARE = 0.8
+"""Of the motion's, as turns on the spot begin and end: what is left is for mending errors."""
+THERE_M, FACES_RAD, SETTLES_S = 0.005, 0.02, 1.5
+"""It goes on at a corner where it is so near to a line's end, or faces the next line so well, or after so
+long: an estimate may be vaguer than that."""
 AROUND, BACKING = 0.6, 0.2
 """Shares of the gap that are kept where it drives around somebody, and where it backs out before him."""
 WALL_M, LEAST_M = 0.02, 0.005
@@ -69,6 +75,12 @@ SEEN_M = 0.05
 """What is seen and on no map counts as discs of this radius where a path around it is planned."""
 
 
+ARCS = KanayamaConfig(along_per_s=1.0, length_m=0.45)
+"""Steered axles follow arcs softly."""
+LINES = KanayamaConfig(along_per_s=3.0, length_m=0.2)
+"""Lines begin at rest, after a turn that leads them astray by little, and may be no longer than this."""
+
+
 class ManeuverConfig(Config):
     """How fast, and when a maneuver has gone wrong."""
 
@@ -81,8 +93,9 @@ class ManeuverConfig(Config):
     """At each change of direction: the wheels turn meanwhile."""
     astray_m: Positive = 0.25
     """Farther from its reference than this it stops and plans anew."""
-    tracking: KanayamaConfig = KanayamaConfig(along_per_s=1.0, length_m=0.45)
-    """Of the tracking law, where the stack names no controller."""
+    tracking: KanayamaConfig | None = None
+    """Of the tracking law, where the stack names no controller; None: along 1.0 / s within 0.45 m, and on
+    lines with turns on the spot at their corners along 3.0 / s within 0.2 m."""
     own_half: OwnHalfConfig = OwnHalfConfig()
     """How near it comes to what its laser sees and its map does not explain."""
     yielding: YieldingConfig = YieldingConfig()
@@ -128,7 +141,9 @@ class ManeuverNavigator(LocalizingNavigator):
         )
         self._config, self._robot, self._goal = config, robot, goal
         check_keeps_time(parts, "maneuver")
-        self._controller: Controller = parts.controller or KanayamaController(config.tracking, robot)
+        self._controller: Controller = parts.controller or KanayamaController(config.tracking or ARCS, robot)
+        sharper = parts.controller is None and config.tracking is None
+        self._on_lines = KanayamaController(LINES, robot) if sharper else self._controller
         self._mapper, self._mates = parts.mapper, task.mates
         self._own_map = OwnMap(chart, parts.mapper)
         car = car_of(robot.footprint, WALL_M, 1.0)
@@ -149,6 +164,7 @@ class ManeuverNavigator(LocalizingNavigator):
         self._lost_s, self._wandered = math.inf, False
         self._replans, self._rests = 0, 0
         self._backs = False
+        self._law, self._has_corners, self._settles_s = self._controller, False, 0.0
         self._to_walls_m = 0.0
         self._trail: Trail | None = None
         self._think_at_s = 0.0
@@ -213,12 +229,15 @@ class ManeuverNavigator(LocalizingNavigator):
         rate = (self._config.turn_share if turns else 1.0) * motion.top_turn_rate_rad_s
         if turning_radius_m == 0.0:
             heading = self.belief.pose.theta_rad
-            rows = with_turns(states, heading, rate, speed, acceleration, dt_s)
+            turning = TURN_ACCELERATION_SHARE * motion.turn_acceleration_rad_s2
+            rows = with_turns(states, heading, rate, speed, acceleration, dt_s, turning)
         else:
             wheels, pause_s = motion.curvature_rate_per_m_s, 0.0 if turns else self._config.pause_s
             rows = laid_out(states, speed, acceleration, wheels, pause_s, dt_s, rate)
         self._reference, self._backs = Reference(rows, dt_s), False
-        self._controller.reset()
+        self._has_corners, self._settles_s = turning_radius_m == 0.0, 0.0
+        self._law = self._on_lines if self._has_corners else self._controller
+        self._law.reset()
 
     def _clearances_m(self) -> list[float]:
         """Clearances to try in turn: the planner's own, and less.
@@ -262,18 +281,22 @@ class ManeuverNavigator(LocalizingNavigator):
         pose = belief.pose
         if self._trail is not None:
             self._trail.add(self.belief)
-        if self._reference.done:
+        settles = self._settles(pose)
+        if self._reference.done and not settles:
             self._ends(readings.t_s)
             return STOP
         self._heed(readings, belief)
         # By where the reference is now: a step leads some way on, farther than astray in a long one.
         there, speed_m_s = self._reference.pose(), self._reference.speed_m_s
-        x, y, theta, v, w, to_go_m = self._reference.step().tolist()
+        row = self._reference.hold() if settles else self._reference.step()
+        x, y, theta, v, w, to_go_m = row.tolist()
         self._channel.tell(x, y, theta, to_go_m)
         if math.hypot(there[0] - pose.x_m, there[1] - pose.y_m) > self._config.astray_m:
             return self._astray(readings.t_s)
         rate = self._reference.rate
         command = STOP if rate == 0.0 else self._toward(pose, Pose2(x, y, theta), Twist(v, w))
+        if settles and rate > 0.0 and self._reference.ends is Ends.LINE:
+            command = Twist(NEARS_PER_S * self._short_m(pose), 0.0)
         waits = not self._gives_way.allows(command, pose, self._own_map.mapped_circles_m)
         if not waits and not self._last_word.allows(command):
             shown_m = pose.placed(self._last_word.shown_m)
@@ -289,6 +312,28 @@ class ManeuverNavigator(LocalizingNavigator):
         if act is not Act.NOTHING:
             return self._yields(readings.t_s, act)
         return command
+
+    def _short_m(self, pose: Pose2) -> float:
+        """How much of a line is left before its end; negative behind it."""
+        x, y, theta = self._reference.pose().tolist()
+        return float(math.cos(theta) * (x - pose.x_m) + math.sin(theta) * (y - pose.y_m))
+
+    def _settles(self, pose: Pose2) -> bool:
+        """Whether it is at a corner, and not yet where a line ends or where the next one leads.
+
+        What it turns away short of a line's end it does not sweep, and is beside the next line; as is who
+        sets out on that askew. No line is long enough to make up for it.
+        """
+        ends = self._reference.ends
+        if not self._has_corners or ends is Ends.NEITHER:
+            self._settles_s = 0.0
+            return False
+        if ends is Ends.LINE:
+            off = self._short_m(pose) > THERE_M
+        else:
+            off = abs(wrap_to_pi(float(self._reference.pose()[2]) - pose.theta_rad)) > FACES_RAD
+        self._settles_s = self._settles_s + self._robot.dt_s if off else 0.0
+        return off and self._settles_s <= SETTLES_S
 
     def _looks_around(self, readings: Readings) -> Twist:
         """Lost: it waits, as doubts pass, and drives about then, for who stands sees nothing new."""
@@ -312,10 +357,10 @@ class ManeuverNavigator(LocalizingNavigator):
         v, w = feedforward.v_m_s, feedforward.w_rad_s
         if v == 0.0:
             turns = self._robot.motion.least_turning_radius_m == 0.0
-            return Twist(
-                0.0, w + HEADING_PER_S * wrap_to_pi(there.theta_rad - pose.theta_rad) if turns else w
-            )
-        twist = self._controller.step(pose, there, feedforward).twist
+            # As in the tracking law the reference is meant for the step's end.
+            off_rad = wrap_to_pi(there.theta_rad - pose.theta_rad - w * self._robot.dt_s)
+            return Twist(0.0, w + HEADING_PER_S * off_rad if turns else w)
+        twist = self._law.step(pose, there, feedforward).twist
         # The way back along the path is the other direction's: a piece is driven in its own only.
         return Twist(max(twist.v_m_s, 0.0) if v > 0.0 else min(twist.v_m_s, 0.0), twist.w_rad_s)
 
@@ -407,11 +452,17 @@ class ManeuverNavigator(LocalizingNavigator):
             self._journal.say(t_s, "arrived", "the plan was driven to its end")
 
     def _goes_for_the_rest(self, t_s: float) -> bool:
-        """Whether what it drove along left something, and there is a path to that."""
+        """Whether what it drove along left something, and there is a path to that.
+
+        Where there is none beside what its lasers showed where it stopped, as if it had not been shown
+        that: a doubtful place shuts a passage for as long as it takes to sweep all else, not for good.
+        """
         if self._trail is None or self._rests == MOST_RESTS:
             return False
         self._rests += 1
         result = self._planned(t_s, rest=True)
+        if not result.covers and self._own_map.forgets():
+            result = self._planned(t_s, rest=True)
         if result.path is None or not result.covers:
             return False
         self._lay_out(result.path)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from enum import Enum, auto
 
 import numpy as np
 
@@ -11,6 +12,14 @@ from pilotage.core.types import FloatArray
 
 STANDS = 0.02
 """A clock slower than this stands."""
+
+
+class Ends(Enum):
+    """What a corner of a reference ends."""
+
+    NEITHER = auto()
+    LINE = auto()
+    TURN = auto()
 
 
 class Reference:
@@ -24,6 +33,9 @@ class Reference:
 
     def __init__(self, rows: FloatArray, dt_s: float) -> None:
         self._rows, self._dt_s = rows, dt_s
+        drives = np.append(rows[:, 3] != 0.0, False)
+        changes = np.flatnonzero(drives[1:] != drives[:-1]) + 1
+        self._corners = np.union1d(changes, [len(rows)])
         self._at, self._before, self.rate = 0.0, 0.0, 1.0
         ahead_m = dt_s * np.abs(rows[::-1, 3]).cumsum()[::-1]
         self._to_go_m = np.append(ahead_m, 0.0)
@@ -57,14 +69,32 @@ class Reference:
             count = min(count, int(np.searchsorted(along_m, within_m)) + 1)
         return np.vstack([self.pose(), self._rows[first : first + count, :3]])
 
+    @property
+    def ends(self) -> Ends:
+        """What ends where it is: a line, a turn on the spot, or neither."""
+        index = int(self._at)
+        if index == 0 or self._at != index or index not in self._corners:
+            return Ends.NEITHER
+        return Ends.TURN if self._rows[index - 1, 3] == 0.0 else Ends.LINE
+
+    def hold(self) -> FloatArray:
+        """(6,) as ``step``, but its clock stands: pose, no speeds, and the way to go."""
+        self._before = self._at
+        to_go_m = np.interp(self._at, np.arange(len(self._to_go_m)), self._to_go_m)
+        return np.array([*self.pose(), 0.0, 0.0, to_go_m])
+
     def step(self) -> FloatArray:
-        """Move on by a step of its clock: (6,) pose, speed, turn rate and the way to go from there."""
+        """Move on by a step of its clock: (6,) pose, speed, turn rate and the way to go from there.
+
+        Where a line or a turn on the spot ends it stops in any case.
+        """
         row = self._rows[int(self._at)]
         v, w = self.rate * row[3], self.rate * row[4]
         self._before = self._at
-        self._at = min(self._at + self.rate, float(len(self._rows)))
-        if len(self._rows) - self._at < STANDS:
-            self._at = float(len(self._rows))
+        corner = float(self._corners[np.searchsorted(self._corners, self._at, side="right")])
+        self._at = min(self._at + self.rate, corner)
+        if corner - self._at < STANDS:
+            self._at = corner
         to_go_m = np.interp(self._at, np.arange(len(self._to_go_m)), self._to_go_m)
         return np.array([*self.pose(), v, w, to_go_m])
 

@@ -17,7 +17,6 @@ TRANSITION_M = 0.10
 CREEP_M_S = 0.03
 SHARP_RAD = 0.3
 """From one state to the next: a path that turns more than this has a corner there."""
-SETTLES_S = 0.3
 
 
 def with_turns(
@@ -27,6 +26,7 @@ def with_turns(
     speed_m_s: float,
     acceleration_m_s2: float,
     dt_s: float,
+    turn_acceleration_rad_s2: float = math.inf,
 ) -> FloatArray:
     """(N, 5) as ``laid_out``, for who turns on the spot: at corners it stops, turns, and goes on.
 
@@ -34,7 +34,10 @@ def with_turns(
     ----------
     theta_rad
         Its heading before the path.
+    turn_acceleration_rad_s2
+        Of its turns on the spot: who is told to turn faster at once than it can turns too far.
     """
+    turning = turn_rate_rad_s, turn_acceleration_rad_s2, dt_s
     corners = np.flatnonzero(np.abs(wrap_array_to_pi(np.diff(states[:, 2]))) > SHARP_RAD) + 1
     rows: list[FloatArray] = []
     for first, last in pairwise([0, *corners.tolist(), len(states) - 1]):
@@ -46,23 +49,33 @@ def with_turns(
         piece = piece[np.concatenate([[True], moves])]
         if len(piece) < 2:
             continue
-        rows.append(_turn(piece[0], theta_rad, turn_rate_rad_s, dt_s))
+        rows.append(_turn(piece[0], theta_rad, *turning))
         rows.append(laid_out(piece, speed_m_s, acceleration_m_s2, math.inf, 0.0, dt_s, turn_rate_rad_s))
         theta_rad = float(piece[-1, 2])
-    rows.append(_turn(states[-1], theta_rad, turn_rate_rad_s, dt_s))
+    rows.append(_turn(states[-1], theta_rad, *turning))
     return np.vstack(rows)
 
 
-def _turn(state: FloatArray, theta_rad: float, rate_rad_s: float, dt_s: float) -> FloatArray:
-    """Rows of a turn on the spot from a heading to that of a state, and of settling there."""
+def _turn(
+    state: FloatArray, theta_rad: float, rate_rad_s: float, acceleration_rad_s2: float, dt_s: float
+) -> FloatArray:
+    """Rows of a turn on the spot from a heading to that of a state, from rest to rest."""
     angle = wrap_to_pi(float(state[2]) - theta_rad)
-    count = math.ceil(abs(angle) / (rate_rad_s * dt_s) - 1e-9)
-    settles = math.ceil(SETTLES_S / dt_s) if count else 0
-    rows = np.zeros((count + settles, 5))
+    size = abs(angle)
+    rate = min(rate_rad_s, math.sqrt(size * acceleration_rad_s2)) if size > 0.0 else rate_rad_s
+    ramp_s = rate / acceleration_rad_s2
+    count = math.ceil((size / rate + ramp_s) / dt_s - 1e-9) if size > 0.0 else 0
+    # In whole steps: a little slower all the way.
+    t_s = np.linspace(0.0, size / rate + ramp_s, count + 1)
+    at = np.maximum(t_s - 0.5 * ramp_s, 0.0) * rate
+    if ramp_s > 0.0:
+        speeding, slowing = t_s < ramp_s, t_s > t_s[-1] - ramp_s
+        at[speeding] = 0.5 * acceleration_rad_s2 * t_s[speeding] ** 2
+        at[slowing] = size - 0.5 * acceleration_rad_s2 * (t_s[-1] - t_s[slowing]) ** 2
+    at = np.copysign(np.minimum(at, size), angle)
+    rows = np.zeros((count, 5))
     rows[:, 0], rows[:, 1] = state[0], state[1]
-    share = np.minimum(np.arange(1, len(rows) + 1) / max(count, 1), 1.0)
-    rows[:, 2] = wrap_array_to_pi(theta_rad + share * angle)
-    rows[:count, 4] = angle / (max(count, 1) * dt_s)
+    rows[:, 2], rows[:, 4] = wrap_array_to_pi(theta_rad + at[1:]), np.diff(at) / dt_s
     return rows
 
 
