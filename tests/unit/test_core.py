@@ -216,6 +216,8 @@ class Outer(Config):
     def _small(self) -> Outer:
         if self.size_m > 100.0:
             raise ValueError("Size_m must be at most 100")
+        if self.steps > 10 and not self.often:
+            raise ValueError("steps: expected at most 10 unless often, found more")
         return self
 
 
@@ -233,6 +235,7 @@ class Outer(Config):
         ({"size_m": math.inf}, "world.size_m: input should be a finite number, found inf"),
         ({"size_m": 1, "inner": {"gate": 1.5}}, "world.inner.gate: input should be less than 1, found 1.5"),
         ({"size_m": 200}, "world: size_m must be at most 100, found {'size_m': 200}"),
+        ({"size_m": 1, "steps": 11}, "world.steps: expected at most 10 unless often, found more"),
         ([1, 2], "world: expected a mapping of keys, found [1, 2]"),
         (None, "world: expected a mapping of keys, found nothing"),
     ],

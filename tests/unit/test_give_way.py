@@ -118,6 +118,30 @@ def test_what_appears_far_from_what_went_out_of_sight_has_not_walked_there(away_
         assert not _looks(bodies, 0.1 * k, [[3.0, away_m, 0.25]]), f"step {k}"
 
 
+@pytest.mark.parametrize("walks", [False, True])
+@pytest.mark.parametrize("seed", range(6, 11))
+def test_a_laser_that_is_wrong_now_and_then_shows_nobody_and_hides_nobody(seed: int, walks: bool) -> None:
+    """A twentieth of the beams ends up to 3 m off, many of them near the robot and near each other."""
+    rng = np.random.default_rng(seed)
+    hall = np.array([[-6.0, 1.6, 8.0, 1.6], [-6.0, -1.6, 8.0, -1.6], [8.0, -1.6, 8.0, 1.6]])
+    walls = SegmentMap(hall, np.zeros((0, 3)), (-6.0, -6.0, 8.0, 6.0))
+    bodies = MovingBodies(MovingBodiesConfig(), ROBOT, WorldMap("hall", walls.bounds_m, walls))
+    first = float(LIDAR.beam_angles_rad()[0])
+    for k in range(200):
+        x = 0.02 * k
+        circles = np.array([[x + 2.0, -1.0 + 0.1 * min(k, 20), 0.25]]) if walks else NOTHING
+        ranges = fan_ranges(x, 0.0, first, LIDAR.beam_step_rad, 539, 12.0, hall, circles)
+        wrong = rng.random(539) < 0.05
+        ranges = np.clip(np.where(wrong, ranges + rng.uniform(-3.0, 3.0, 539), ranges), 0.0, 12.0)
+        belief = Belief(Pose2(x, 0.0, 0.0), 1e-6 * np.eye(3))
+        bodies.step(Readings(0.1 * k, {"lidar": LidarScan(ranges)}), belief)
+        if not walks:
+            assert not bodies.about, f"step {k}"
+        elif k == 20:
+            assert bodies.about
+            assert (np.hypot(*(bodies.discs_m()[:, :2] - circles[0, :2]).T) < 0.3).any()
+
+
 def test_who_is_hidden_for_a_moment_has_walked_all_the_same() -> None:
     bodies = MovingBodies(MovingBodiesConfig(), ROBOT, CHART)
     seen = [

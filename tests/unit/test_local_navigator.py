@@ -13,8 +13,10 @@ from pilotage.core.types import STOP, Pose2, Twist
 from pilotage.models.footprint import Footprint
 from pilotage.models.motion.bicycle import BicycleConfig
 from pilotage.models.motion.differential_drive import DifferentialDriveConfig
+from pilotage.sensors.beacon import BeaconConfig
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, OdometryIncrement, Reading, Readings
+from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 from pilotage.stack.control.local.drive import in_sight, limits_of, polygon_around
 from pilotage.stack.control.local.role import LocalView
 from pilotage.stack.interface import Belief, StackStatus
@@ -212,3 +214,12 @@ def test_what_it_cannot_drive_is_refused() -> None:
     blind = replace(told, robot=replace(told.robot, sensors={}))
     with pytest.raises(InputError, match="expected one lidar"):
         navigator(Noting(), blind)
+
+
+def test_a_sensor_that_is_missed_is_not_confused_with_what_another_is_called() -> None:
+    told = told_of()
+    named = {"odometry": WheelOdometryConfig(), "lidar": BeaconConfig(), "beacons": BeaconConfig()}
+    robot = replace(told.robot, sensors=named)
+    expected = r"expected one lidar among .* has: odometry \(wheel-odometry\), lidar \(beacons\), beacons$"
+    with pytest.raises(InputError, match=expected):
+        robot.one_sensor(LidarConfig, "who asks")

@@ -157,6 +157,10 @@ def describe(
         bound, key = ("at most", "max_length") if first["type"] == "too_long" else ("at least", "min_length")
         message = f"expected {bound} {first['ctx'][key]} items, found {first['ctx']['actual_length']}"
     message = _as_of_a_file(message[:1].lower() + message[1:])
+    # A rule among several keys of one level names the one that it is about.
+    key, colon, rest = message.partition(": ")
+    if place and colon and first["type"] == "value_error" and key in _fields_at(model, path):
+        place, message = f"{place}.{key}", rest
     # A rule that says itself what it found, or is about the whole file: the dump would only bury it.
     if place and ", found " not in message:
         message += f", found {_show(first['input'])}"

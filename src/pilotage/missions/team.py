@@ -66,10 +66,9 @@ class TeamConfig(Config):
     @model_validator(mode="after")
     def _a_place_for_each(self) -> TeamConfig:
         if self.size is not None and self.starts and self.size > len(self.starts):
-            raise ValueError(
-                f"size: expected at most {len(self.starts)} robots, one for each of team.starts, "
-                f"found {self.size}"
-            )
+            places = len(self.starts)
+            robots = f"{places} robots, one for each of" if places > 1 else "1 robot, for the one place of"
+            raise ValueError(f"size: expected at most {robots} team.starts, found {self.size}")
         return self
 
 

@@ -80,9 +80,18 @@ class RobotKnowledge:
             names = [entry.name for entry in SENSORS if issubclass(entry.config, kind)]
             raise InputError(
                 f"{needed_by}: expected one {' or '.join(names)} among robot.sensors, "
-                f"found {len(found)}; the robot has: {', '.join(self.sensors) or 'none'}"
+                f"found {len(found)}; the robot has: {self._sensors_in_words() or 'none'}"
             )
         return found[0]
+
+    def _sensors_in_words(self) -> str:
+        """Each one's name, and its kind where the name does not say it: beacons may be called 'lidar'."""
+        kinds = {entry.config: entry.name for entry in SENSORS}
+        told = []
+        for name, config in self.sensors.items():
+            kind = kinds.get(type(config), name)
+            told.append(name if kind == name else f"{name} ({kind})")
+        return ", ".join(told)
 
 
 @dataclass(frozen=True, slots=True)

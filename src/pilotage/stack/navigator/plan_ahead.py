@@ -93,7 +93,7 @@ class PlanAhead:
         self._stalls, self._planned_s = 0, -math.inf
         self._path: FloatArray = np.zeros((0, 2))
         self.to_go_m = math.inf
-        self.failure, self._why = "", ""
+        self.failure, self._why, self._found_no_path = "", "", ""
         self._status: PlanStatus | None = None
         journal.result("mapped_circles_m", lambda: own_map.found_circles_m)
         journal.counts["replans"] = 0
@@ -113,7 +113,8 @@ class PlanAhead:
             if self._stall.stalled(self.to_go_m, t_s):
                 self._stalls += not self._bodies.about
                 if self._stalls > self._config.most_stalls:
-                    self.failure = f"stuck: no progress on {self._stalls} plans"
+                    found = f"; planning found {self._found_no_path}" if self._found_no_path else ""
+                    self.failure = f"stuck: no progress on {self._stalls} plans{found}"
                 self._make(t_s, pose, f"no progress for {self._stall.patience_s:.3g} s")
             elif t_s - self._planned_s >= self._config.every_s and self._is_blocked():
                 self._make(t_s, pose, "a mapped obstacle stands on the plan")
@@ -160,9 +161,10 @@ class PlanAhead:
         if not first:
             self._journal.count("replans")
         if result.path is None:
-            self._why = result.reason
+            self._why, self._found_no_path = result.reason, f"{result.status} ({result.reason})"
             self._journal.say(t_s, "no-plan", f"{why}: {result.status}, {result.reason}")
             return
+        self._found_no_path = ""
         assert self._plan.path is not None
         self._path = np.ascontiguousarray(self._plan.path.states[:, :2])
         self._stall.restart(t_s)

@@ -139,6 +139,7 @@ class MovingBodies:
             self._movers.forget(self._movers.tracks[:, kernels.PP] > VAGUE_M**2)
         # Before the first one is known nothing is taken for somebody of which only a moving part is seen.
         whole = np.ones(len(points), np.bool_) if self.about else ~self._cut_off(points, beams, scan.ranges_m)
+        whole &= beside_each_other(points, beams, len(scan.ranges_m), config.tracks.gap_m)
         of_track[whole] = self._movers.track(x, y, pose.theta_rad, points[whole], dt_s, self._field)
         self._walks = self._told(pose, x, y, first, scan.ranges_m)
         walks = np.append(self._walks, False)[of_track]
@@ -262,3 +263,16 @@ class MovingBodies:
             return math.inf
         discs = self.discs_m()
         return float((np.hypot(discs[:, 0] - x_m, discs[:, 1] - y_m) - discs[:, 2]).min())
+
+
+def beside_each_other(points: FloatArray, beams: IntArray, of: int, gap_m: float) -> BoolArray:
+    """Which points (K, 2) lie within ``gap_m`` of one of a neighbouring beam; ``beams`` (K,) ``of`` so many.
+
+    What three beams see is hit by all that lie between them. A laser that is wrong now and then has returns
+    near each other whose neighbours look past them: seen through the next moment, they would have walked.
+    """
+    after = np.roll(np.arange(len(beams)), -1)
+    joined = (beams[after] - beams) % of == 1
+    joined &= np.hypot(*(points[after] - points).T) < gap_m
+    paired: BoolArray = joined | np.roll(joined, 1)
+    return paired
