@@ -67,15 +67,12 @@ def _within_reach(floor: Floor, inner: Floor, reach_m: float) -> BoolArray:
 def rest_of(whole: Sought, trail: FloatArray, width_m: float, enough: float) -> Sought:
     """What a trail left of the floor, but for the least of it, and the rim beside that.
 
-    Half of what passes are planned to overlap by is left to the robot's error: by its own estimate it has
-    swept cells that it passed by millimetres too far from.
-
     Parameters
     ----------
     enough
         Share of the floor: the smallest pieces are left for good, down to this.
     """
-    floor, swept = whole.floor, surely_covered(whole.floor, trail, 0.5 * (width_m + whole.width_m))
+    floor, swept = whole.floor, surely_covered(whole.floor, trail, width_m)
     must = _but_the_least(whole.must & ~swept, (1.0 - enough) * np.count_nonzero(whole.must))
     away_m = floor.cell_m * scipy.ndimage.distance_transform_edt(~must)
     return replace(whole, must=must, may=whole.may & ~swept & (away_m <= 0.5 * width_m))
