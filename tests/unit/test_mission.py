@@ -48,6 +48,18 @@ def test_every_shipped_mission_is_valid_and_called_what_its_file_is() -> None:
         assert mission.description
 
 
+def test_what_a_mission_says_of_itself_is_not_said_of_another_that_extends_it(tmp_path: Path) -> None:
+    own = {"mission": "mine", "description": "my own words"}
+    for values, said in (
+        ({"mission": "mine"}, "extends museum-plan"),
+        (own, "my own words"),
+        ({"run": {"seed": 3}}, load_mission("museum-plan").description),
+    ):
+        file = tmp_path / "mine.yaml"
+        file.write_text(yaml.safe_dump({"extends": "museum-plan", **values}))
+        assert load_mission(str(file)).description == said
+
+
 def test_the_museum_has_the_reports_walls_and_beacons() -> None:
     assert MUSEUM.walls.segments_m.shape == (32, 4)
     assert len(MUSEUM.landmarks) == 35

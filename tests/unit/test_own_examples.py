@@ -73,6 +73,14 @@ def test_a_map_is_drawn_as_it_is_understood(name: str, tmp_path: Path) -> None:
         assert drawn.layers["bounds_m"] == pytest.approx([-1.0, 2.0, 11.0, 10.0])
 
 
+def test_bounds_are_told_without_the_dust_of_sums(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    grid = OccupancyGrid.of(np.zeros((384, 384), dtype=bool), 0.05, pl.Pose2(-10.0, -10.0, 0.0))
+    write_ros_map(tmp_path / "floor.yaml", RosMap.of(grid, "floor.pgm"))
+    assert -10.0 + 384 * 0.05 != 9.2
+    assert main(["draw", str(tmp_path / "floor.yaml"), "--out", str(tmp_path / "floor.png")]) == 0
+    assert "[-10.0, -10.0, 9.2, 9.2]" in capsys.readouterr().out
+
+
 def test_what_cannot_be_drawn_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     Image.fromarray(np.where(room(), 255, 0).astype(np.uint8)).save(tmp_path / "plan.png")
     image = pl.draw(tmp_path / "plan.png", tmp_path / "drawn.png", resolution_m=0.1)

@@ -34,7 +34,14 @@ def draw(
     if json:
         print_json(answer)
     else:
-        print_columns((key, str(value)) for key, value in answer.items())
+        print_columns((key, _in_words(value)) for key, value in answer.items())
+
+
+def _in_words(value: object) -> str:
+    """For people: 384 cells of 0.05 m end at 9.2 m, not at 9.200000000000003."""
+    if isinstance(value, list):
+        return f"[{', '.join(_in_words(one) for one in value)}]"
+    return str(round(value, 9) if isinstance(value, float) else value)
 
 
 def vectorize(

@@ -154,7 +154,11 @@ def extended(values: dict[str, Any], where: str, extended_by: tuple[str, ...] = 
     before = {_place(name) for name in (values.get("mission"), where, *extended_by) if isinstance(name, str)}
     if _place(base) in before:
         raise InputError(f"{where}: extends: a mission cannot extend itself")
-    return merge(read_mission(base, (*extended_by, where)), values)
+    found = read_mission(base, (*extended_by, where))
+    if "mission" in values and "description" in found:
+        # What one says of itself is not true of another that has its own name, and its own goal perhaps.
+        found = {**found, "description": f"extends {found.get('mission', base)}"}
+    return merge(found, values)
 
 
 def _is_path(name: str) -> bool:
