@@ -328,3 +328,11 @@ def test_one_alone_drives_through_doors_without_stumbling() -> None:
     metrics = judged(values, 1)
     assert metrics["idleness_worst_s"] < 1.25 * metrics["idleness_bound_s"]
     assert metrics["collisions"] == 0
+
+
+def test_a_wrong_range_of_nothing_leads_nobody_astray() -> None:
+    """Who seeks a way out divided by how far away it lies, and warned."""
+    outliers = "robot.faults=[{name: outliers, sensor: lidar, share: 0.2, most_m: 9}]"
+    times = ("task.duration_s=20", "run.time_limit_s=20", "team.size=4")
+    finished = run_loop(build(load_mission("museum-patrol", (outliers, *times), 0))).finished
+    assert all(robot.collisions == 0 for robot in finished.robots)

@@ -268,8 +268,10 @@ def way_out(context: Context) -> int:
     else:
         around |= set(graph.neighbours(context.hop).tolist())
     here = np.array([pose.x_m, pose.y_m])
-    bearings = disc_returns.within(context.strange_on_map() - here, context.config.watch_m)
-    bearings /= np.hypot(*bearings.T)[:, None]
+    strange_m = disc_returns.within(context.strange_on_map() - here, context.config.watch_m)
+    away_m = np.hypot(*strange_m.T)
+    # A wrong range of 0 lies nowhere from here.
+    bearings = strange_m[away_m > 0.0] / away_m[away_m > 0.0, None]
     best, least = -1, math.inf
     for vertex in sorted(around):
         if context.away_m(vertex) <= 0.5 * context.task.visit_m:
