@@ -137,7 +137,7 @@ ANSWERS = [
     ("heading", "gyroscope.0.axis", "w", "gyroscope.0.axis: unknown value 'w'; known: x, y, z"),
     ("heading", "magnetometer.0.soft_iron", [[1, 1], [1, 1]], "soft_iron: expected a matrix that has an"),
     ("heading", "magnetometer.0.soft_iron", [[1, 1]], "soft_iron: expected two rows of two numbers"),
-    ("heading", "magnetometer.0.axes", "zx", "magnetometer.0: offset_gauss: expected axis z, found none"),
+    ("heading", "magnetometer.0.axes", "zx", "magnetometer.0.offset_gauss: expected axis z, found none"),
     ("heading", "gyroscope_while_driving.0.bias_with_scale_rad_s", None, "expected a bias with the scale"),
 ]
 

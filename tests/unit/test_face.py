@@ -68,7 +68,9 @@ def test_a_mission_comes_from_a_name_a_file_or_a_mapping(tmp_path: Path) -> None
     values = {"extends": "museum-1", "mission": "own", "run": {"seed": np.int64(7)}}
     from_values = pl.load(values, set={"stack.localizer.gate": np.float64(0.99)})
     for other in (pl.load(file), pl.load(str(file)), from_values):
-        assert other.model_copy(update={"mission": "museum-1"}) == mission
+        assert other.description == "extends museum-1"
+        named = {"mission": "museum-1", "description": mission.description}
+        assert other.model_copy(update=named) == mission
     assert pl.load(mission) == pl.load(pl.load(mission))
     assert pl.load(mission, seed=8).run.seed == 8
     assert values["run"] == {"seed": 7}, "the caller's mapping stays as it was"
