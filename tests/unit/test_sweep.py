@@ -34,8 +34,6 @@ from pilotage.maps.world_map import WorldMap
 from pilotage.models.footprint import Footprint
 from pilotage.stack.control.last_word import LastWord
 from pilotage.stack.control.own_half import OwnHalf
-from pilotage.stack.navigator.reference import Ends, Reference
-from pilotage.stack.navigator.timed_path import with_turns
 from pilotage.stack.planning.boustrophedon import BoustrophedonConfig, BoustrophedonPlanner
 from pilotage.stack.planning.planner import PlanRequest, PlanResult
 from pilotage.stack.planning.sweep_changes import subdivided
@@ -482,56 +480,6 @@ class TestTask:
         values = {**MISSIONS["sweep-floor"], "team": {"size": 2}}
         with pytest.raises(InputError, match="task 'sweep-floor': expected one robot, found 2"):
             build(mission_of(values))
-
-
-def test_at_corners_it_turns_first_by_the_shorter_way() -> None:
-    leg = np.linspace(0.0, 1.0, 11)
-    there = np.column_stack([leg, np.zeros(11), np.zeros(11)])
-    up = np.column_stack([np.ones(11), leg, np.full(11, 0.5 * np.pi)])
-    back = np.column_stack([np.ones(11), leg[::-1], np.full(11, -0.5 * np.pi)])
-    rows = with_turns(np.vstack([there[:-1], up[:-1], back]), np.pi / 2, 1.0, 0.5, 1.0, 0.1)
-    stands = rows[:, 3] == 0.0
-    turns = np.flatnonzero(np.diff(np.concatenate([[False], stands & (rows[:, 4] != 0.0)]).astype(int)) == 1)
-    assert len(turns) == 3  # before the first leg, at the corner, and before the way back
-    turned = [0.1 * rows[k:][: int(np.argmin(rows[k:, 4] != 0.0)), 4].sum() for k in turns]
-    assert np.abs(turned) == pytest.approx([np.pi / 2, np.pi / 2, np.pi])
-    assert turned[:2] == pytest.approx([-np.pi / 2, np.pi / 2])
-    # Nobody jumps, nobody is too fast, and it ends where the path does.
-    assert np.hypot(*np.diff(rows[:, :2], axis=0).T).max() <= 0.5 * 0.1 + 1e-9
-    assert rows[-1, :3] == pytest.approx([1.0, 0.0, -np.pi / 2])
-
-
-def test_turns_on_the_spot_begin_and_end_at_rest() -> None:
-    """Told to turn at its full rate at once a robot comes late, and turns too far."""
-    leg = np.linspace(0.0, 1.0, 11)
-    path = np.column_stack([leg, np.zeros(11), np.zeros(11)])
-    for turn in (0.02, 0.4, 3.0):
-        rows = with_turns(path, turn, 1.0, 0.5, 1.0, 0.1, 2.0)
-        count = int(np.argmax(rows[:, 3] != 0.0))
-        rates = np.concatenate([[0.0], rows[:count, 4], [0.0]])
-        assert np.abs(np.diff(rates)).max() <= 2.0 * 0.1 + 1e-9
-        assert np.abs(rates).max() <= 1.0 + 1e-9
-        assert 0.1 * rates.sum() == pytest.approx(-turn)
-        assert rows[count - 1, 2] == pytest.approx(0.0, abs=1e-9)
-
-
-def test_a_reference_stops_where_a_turn_or_a_line_ends() -> None:
-    """With its clock at 0.7 it passed corners in the middle of a step."""
-    leg = np.linspace(0.0, 1.0, 11)
-    path = np.column_stack([leg, np.zeros(11), np.zeros(11)])
-    reference = Reference(with_turns(path, 0.5 * np.pi, 1.0, 0.5, 1.0, 0.1), 0.1)
-    assert reference.ends is Ends.NEITHER
-    ended: list[tuple[Ends, float, float, float]] = []
-    while not reference.done:
-        reference.rate = 0.7
-        reference.step()
-        if reference.ends is not Ends.NEITHER:
-            ended.append((reference.ends, *reference.pose().tolist()))
-            held = reference.hold()
-            assert held[:5] == pytest.approx([*reference.pose(), 0.0, 0.0])
-    assert [kind for kind, *_ in ended] == [Ends.TURN, Ends.LINE]
-    assert ended[0][1:] == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
-    assert ended[1][1:] == pytest.approx((1.0, 0.0, 0.0), abs=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -17,6 +17,7 @@ from pilotage.records.scans import Sightings
 from pilotage.records.terrain import TerrainPictures
 
 MOST_GRID_CELLS = 4_000_000
+"""Beyond this a grid is large."""
 PICTURE_COLUMNS = 900
 """Ground and hazards are kept for the report no wider and no higher than this."""
 
