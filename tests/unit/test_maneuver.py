@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,8 +12,8 @@ from pilotage.experiments.build.build import build
 from pilotage.experiments.loop import run_loop
 from pilotage.experiments.mission import load_mission, mission_of, read_mission
 from pilotage.experiments.run import run_mission
-from pilotage.stack.journal import Journal
-from pilotage.stack.navigator.maneuver import MOST_STOPS, ManeuverConfig, ManeuverNavigator
+from pilotage.stack.navigator.maneuver import ManeuverConfig, ManeuverNavigator
+from pilotage.stack.navigator.maneuver.stops import MOST_STOPS, Stops
 from pilotage.stack.navigator.navigator import Parts
 from support.robots import told_of
 
@@ -84,24 +83,18 @@ def test_who_knows_its_place_by_satellites_gets_on_though_its_estimate_jumps(see
     assert int(str(metrics["replans"])) > 8
 
 
-def test_who_is_stopped_again_and_again_gives_up_only_where_it_gets_no_farther(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_who_is_stopped_again_and_again_gives_up_only_where_it_gets_no_farther() -> None:
     """A sweep of a ragged floor was given up at its thirteenth nook, with half of the floor swept."""
-    navigator, ended = ManeuverNavigator.__new__(ManeuverNavigator), []
-    vars(navigator).update(_backs=False, _stops=0, _stopped_to_go_m=math.inf, _journal=Journal())
-    vars(navigator).update(_own_map=SimpleNamespace(show=lambda _: None))
-    vars(navigator).update(_yielding=SimpleNamespace(way_back=lambda _: np.zeros((0, 3))))
-    monkeypatch.setattr(ManeuverNavigator, "_think", lambda *_: None)
-    monkeypatch.setattr(ManeuverNavigator, "_end", lambda *told: ended.append(told))
-    nook = np.zeros((1, 2))
+    stops = Stops()
     for k in range(40):
-        navigator._stops_short(float(k), nook, 50.0 - k)
-    assert not ended
-    # To and fro between two of them it gets no farther.
-    for k in range(MOST_STOPS):
-        navigator._stops_short(40.0 + k, nook, 10.0 + 3.0 * (k % 2))
-    assert len(ended) == 1
+        stops.again(50.0 - k)
+    assert not stops.too_many
+    # To and fro between two of them, or backing out before them, it gets no farther.
+    for k in range(MOST_STOPS - 1):
+        stops.again(math.inf if k % 3 == 2 else 10.0 + 3.0 * (k % 2))
+    assert not stops.too_many
+    stops.again(10.0)
+    assert stops.too_many
 
 
 @pytest.mark.parametrize("seed", [8, 11, 12])

@@ -12,9 +12,9 @@ from pilotage.stack.interface import Belief
 from pilotage.stack.navigator.goal.context import HERE_TOLERANCE_M, Context
 from pilotage.stack.navigator.goal.ended import arrive
 from pilotage.stack.navigator.goal.escaping import begin_escape, make_room, replan, set_out
-from pilotage.stack.navigator.goal.state import Move, State
 from pilotage.stack.navigator.goal_config import Mode
 from pilotage.stack.navigator.navigator import turned_by
+from pilotage.stack.navigator.state import Move, State
 
 ALIGNED_RAD = 0.1
 """Turned on the spot until this near to the plan's heading."""

@@ -2,23 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from pilotage.core.types import STOP
-from pilotage.sensors.readings import Readings
-from pilotage.stack.interface import Belief, StackStatus
+from pilotage.stack.interface import StackStatus
 from pilotage.stack.navigator.goal.context import Context
-from pilotage.stack.navigator.goal.state import Move
 from pilotage.stack.navigator.goal_config import Mode
-
-
-@dataclass(frozen=True, slots=True)
-class Ended:
-    """Stands still for good."""
-
-    def step(self, readings: Readings, belief: Belief) -> Move:  # noqa: ARG002 - nothing matters any more
-        """Stay."""
-        return Move(self, STOP)
+from pilotage.stack.navigator.state import Ended, Move
 
 
 def arrive(context: Context) -> Move:

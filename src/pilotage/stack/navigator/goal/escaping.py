@@ -9,8 +9,8 @@ from pilotage.sensors.readings import Readings
 from pilotage.stack.interface import Belief
 from pilotage.stack.navigator.goal.context import HERE_TOLERANCE_M, Context
 from pilotage.stack.navigator.goal.ended import fail
-from pilotage.stack.navigator.goal.state import Move, State
 from pilotage.stack.navigator.goal_config import Mode
+from pilotage.stack.navigator.state import Move, State
 
 WAITS = 1
 """So often it waits before it makes room."""

@@ -10,9 +10,9 @@ from pilotage.stack.interface import Belief, BeliefStatus
 from pilotage.stack.navigator.goal.context import Context
 from pilotage.stack.navigator.goal.driving import Following
 from pilotage.stack.navigator.goal.ended import fail
-from pilotage.stack.navigator.goal.state import Move, State
 from pilotage.stack.navigator.goal_config import Mode
 from pilotage.stack.navigator.navigator import DISC_HINT
+from pilotage.stack.navigator.state import Move, State
 from pilotage.stack.planning.plan_status import PlanStatus
 
 PLAN_AGAIN_S = 1.0

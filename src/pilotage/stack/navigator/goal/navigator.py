@@ -14,12 +14,11 @@ from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.mapping.mapper import Mapper
 from pilotage.stack.navigator.global_plan import GlobalPlan
 from pilotage.stack.navigator.goal.context import Context
-from pilotage.stack.navigator.goal.ended import Ended
 from pilotage.stack.navigator.goal.finding import Lost, first_state, lose
-from pilotage.stack.navigator.goal.state import State
 from pilotage.stack.navigator.goal_config import GoalNavigatorConfig
 from pilotage.stack.navigator.navigator import Parts, check_for_centre, localizer_of
 from pilotage.stack.navigator.own_map import OwnMap
+from pilotage.stack.navigator.state import Ended, State
 from pilotage.stack.perception.moving_bodies import MovingBodies
 
 COLUMNS = {

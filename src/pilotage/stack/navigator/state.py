@@ -1,10 +1,11 @@
-"""What a state of the goal navigator is, and what a step in one comes to."""
+"""What a state of a navigator is, what a step in one comes to, and the last one."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
-from pilotage.core.types import Twist
+from pilotage.core.types import STOP, Twist
 from pilotage.sensors.readings import Readings
 from pilotage.stack.interface import Belief
 
@@ -21,3 +22,12 @@ class Move(NamedTuple):
 
     state: State
     command: Twist
+
+
+@dataclass(frozen=True, slots=True)
+class Ended:
+    """Stands still for good: it has arrived, or failed."""
+
+    def step(self, readings: Readings, belief: Belief) -> Move:  # noqa: ARG002 - nothing matters any more
+        """Stay."""
+        return Move(self, STOP)

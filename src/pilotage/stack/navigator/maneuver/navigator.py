@@ -1,0 +1,72 @@
+"""The maneuver navigator's plug: localize, step the state that the robot is in."""
+
+from __future__ import annotations
+
+from pilotage.core.errors import InputError
+from pilotage.core.types import Twist
+from pilotage.maps.world_map import WorldMap
+from pilotage.sensors.readings import Readings
+from pilotage.stack.interface import NAVIGATORS, Belief, BeliefStatus, StackStatus
+from pilotage.stack.journal import Journal
+from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
+from pilotage.stack.navigator.maneuver.config import ManeuverConfig
+from pilotage.stack.navigator.maneuver.context import Context
+from pilotage.stack.navigator.maneuver.states import Lost, first_state
+from pilotage.stack.navigator.navigator import Parts, check_keeps_time, localizer_of, missing, only_goal
+from pilotage.stack.navigator.state import Ended
+
+
+@NAVIGATORS.add("maneuver", ManeuverConfig)
+class ManeuverNavigator:
+    """Follows a plan with its changes of direction by a speed profile; the plan is made on the true outline.
+
+    A robot that turns on the spot does so at the path's corners, so that it drives the very lines of a sweep.
+
+    It drives no faster than lets it stop, along its path and with its outline, on its own half of the way to
+    whatever its laser sees that is on no map: team mates, people, things. Without mates on its floor it gives
+    way to who walks, who comes farther than his half. Where that stays in the way it
+    plans around it, or backs out of the way that it came. Where it cannot keep up with the plan it plans
+    anew; what a path that covers a floor left of it, as far as the robot knows, is driven in the end. Lost,
+    it stands, and drives about after a while, a car ahead and back in turn; told nothing of its start it does
+    so at once, and plans from where it finds itself.
+    """
+
+    def __init__(
+        self,
+        config: ManeuverConfig,
+        robot: RobotKnowledge,
+        chart: WorldMap,
+        task: TaskKnowledge,
+        parts: Parts,
+        journal: Journal,
+    ) -> None:
+        goal = only_goal(task, "maneuver")
+        if goal is None or parts.planner is None:
+            absent = missing({"world.goal": goal, "stack.planner": parts.planner})
+            raise InputError(f"navigator 'maneuver': expected world.goal and stack.planner, found {absent}")
+        self._localizer = localizer_of(parts, "maneuver")
+        check_keeps_time(parts, "maneuver")
+        self._context = context = Context(config, robot, chart, task, parts, goal, parts.planner, journal)
+        self._state = first_state(context, self.belief)
+        if context.plan.hopeless and context.plan.too_tight:
+            remedy = "take rrt-star-dubins, or stack.smoother: shortcut"
+            raise InputError(f"navigator 'maneuver': {context.reason}; or {remedy}")
+
+    @property
+    def belief(self) -> Belief:
+        """The localizer's belief."""
+        return self._localizer.belief
+
+    @property
+    def status(self) -> tuple[StackStatus, str]:
+        """How the task stands as the robot sees it, and why."""
+        return self._context.status, self._context.reason
+
+    def step(self, readings: Readings) -> Twist:
+        """One control step."""
+        belief, state, context = self._localizer.step(readings), self._state, self._context
+        context.last_word.take_in(readings)
+        if belief.status is BeliefStatus.LOST and not isinstance(state, Lost | Ended):
+            state = Lost(context, state, readings.t_s)
+        self._state, command = state.step(readings, belief)
+        return context.last_word.leaving(command)
