@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from pilotage.kernels.arrays import BoolArray, FloatArray
+from pilotage.kernels.arrays import BoolArray, ByteArray, FloatArray
 from pilotage.kernels.control.ground import FAR_M
 from pilotage.kernels.grids.distance import NONE, CellIndex
 from pilotage.kernels.jit import kernel, trailing_zeros
@@ -83,6 +83,85 @@ def travel_speed(
 
 
 @kernel
+def _paces(speed: FloatArray) -> tuple[FloatArray, ByteArray]:
+    """Seconds a metre and state of each cell, with ``EDGE`` more all around that are blocked.
+
+    No move has to be looked at for leaving the grid.
+    """
+    m = speed.shape[0]
+    wide = m + 2 * EDGE
+    pace = np.full(wide * wide, np.inf)
+    state = np.full(wide * wide, SHUT)
+    for r in range(m):
+        for c in range(m):
+            if speed[r, c] > 0.0:
+                i = (r + EDGE) * wide + c + EDGE
+                pace[i] = 1.0 / speed[r, c]
+                state[i] = OPEN
+    return pace, state
+
+
+@kernel
+def _seeded(
+    pace: FloatArray,
+    state: ByteArray,
+    m: int,
+    x0: float,
+    y0: float,
+    coarse: float,
+    goal_x: float,
+    goal_y: float,
+    fast: float,
+) -> tuple[FloatArray, float]:
+    """Times of the cells that the search begins with, the others' infinite, and the lowest of them.
+
+    The goal's surroundings are seeds, so that a post right on it does not hide it; or the grid's edge.
+    """
+    wide = m + 2 * EDGE
+    flat = np.full(wide * wide, np.inf)
+    column = math.floor((goal_x - x0) / coarse)
+    row = math.floor((goal_y - y0) / coarse)
+    inside = 0 <= row < m and 0 <= column < m
+    lowest = np.inf
+    for r in range(max(0, row - 3) if inside else 0, min(m, row + 4) if inside else m):
+        for c in range(max(0, column - 3) if inside else 0, min(m, column + 4) if inside else m):
+            i = (r + EDGE) * wide + c + EDGE
+            if state[i] == SHUT or not (inside or r == 0 or c == 0 or r == m - 1 or c == m - 1):
+                continue
+            dx, dy = x0 + (c + 0.5) * coarse - goal_x, y0 + (r + 0.5) * coarse - goal_y
+            flat[i] = math.sqrt(dx * dx + dy * dy) * (pace[i] if inside else 1.0 / fast)
+            lowest = min(lowest, flat[i])
+    return flat, lowest
+
+
+@kernel
+def _read_out(flat: FloatArray, state: ByteArray, m: int, ends: float) -> FloatArray:
+    """Times (m, m) of a search that ended at ``ends``: what was not settled by then is no nearer."""
+    wide = m + 2 * EDGE
+    togo = np.full((m, m), UNREACHED_S)
+    for r in range(m):
+        for c in range(m):
+            i = (r + EDGE) * wide + c + EDGE
+            if state[i] == SETTLED:
+                togo[r, c] = flat[i]
+            elif state[i] == OPEN:
+                if ends < np.inf:
+                    togo[r, c] = min(flat[i], ends)
+                elif flat[i] < np.inf:
+                    togo[r, c] = flat[i]
+            if togo[r, c] < UNREACHED_S:
+                continue
+            best = np.inf
+            for up in range(-wide, wide + 1, wide):
+                for j in range(i + up - 1, i + up + 2):
+                    if state[j] == SETTLED:
+                        best = min(best, flat[j])
+            if best < np.inf:
+                togo[r, c] = best + BLOCKED_EXTRA_S
+    return togo
+
+
+@kernel
 def time_to_go(
     speed: FloatArray,
     x0: float,
@@ -103,33 +182,11 @@ def time_to_go(
     than their best neighbour.
     """
     m = speed.shape[0]
-    # Two more cells all around that are blocked: no move has to be looked at for leaving the grid.
     wide = m + 2 * EDGE
-    flat = np.full(wide * wide, np.inf)
-    pace = np.full(wide * wide, np.inf)
-    state = np.full(wide * wide, SHUT)
-    for r in range(m):
-        for c in range(m):
-            if speed[r, c] > 0.0:
-                i = (r + EDGE) * wide + c + EDGE
-                pace[i] = 1.0 / speed[r, c]
-                state[i] = OPEN
-    column = math.floor((goal_x - x0) / coarse)
-    row = math.floor((goal_y - y0) / coarse)
-    inside = 0 <= row < m and 0 <= column < m
-    lowest = np.inf
-    for r in range(max(0, row - 3) if inside else 0, min(m, row + 4) if inside else m):
-        for c in range(max(0, column - 3) if inside else 0, min(m, column + 4) if inside else m):
-            i = (r + EDGE) * wide + c + EDGE
-            # The goal's surroundings are seeds, so that a post right on it does not hide it; or the edge.
-            if state[i] == SHUT or not (inside or r == 0 or c == 0 or r == m - 1 or c == m - 1):
-                continue
-            dx, dy = x0 + (c + 0.5) * coarse - goal_x, y0 + (r + 0.5) * coarse - goal_y
-            flat[i] = math.sqrt(dx * dx + dy * dy) * (pace[i] if inside else 1.0 / fast)
-            lowest = min(lowest, flat[i])
-    togo = np.full((m, m), UNREACHED_S)
+    pace, state = _paces(speed)
+    flat, lowest = _seeded(pace, state, m, x0, y0, coarse, goal_x, goal_y, fast)
     if lowest == np.inf:
-        return togo
+        return np.full((m, m), UNREACHED_S)
     head = np.full(BUCKETS, np.int32(-1))
     # A cell may stand in several buckets: entries are appended, stale ones are skipped.
     room = 24 * m * m
@@ -215,26 +272,7 @@ def time_to_go(
                 head[to] = entries
                 entries += 1
                 waiting += 1
-    for r in range(m):
-        for c in range(m):
-            i = (r + EDGE) * wide + c + EDGE
-            if state[i] == SETTLED:
-                togo[r, c] = flat[i]
-            elif state[i] == OPEN:
-                if ends < np.inf:
-                    togo[r, c] = min(flat[i], ends)
-                elif flat[i] < np.inf:
-                    togo[r, c] = flat[i]
-            if togo[r, c] < UNREACHED_S:
-                continue
-            best = np.inf
-            for up in range(-wide, wide + 1, wide):
-                for j in range(i + up - 1, i + up + 2):
-                    if state[j] == SETTLED:
-                        best = min(best, flat[j])
-            if best < np.inf:
-                togo[r, c] = best + BLOCKED_EXTRA_S
-    return togo
+    return _read_out(flat, state, m, ends)
 
 
 @kernel
