@@ -80,6 +80,57 @@ def _score(
 
 
 @kernel
+def _turned_cells(
+    points_xy: FloatArray,
+    centre: FloatArray,
+    angles_rad: FloatArray,
+    corner: tuple[float, float, float],
+    shift: int,
+    columns: int,
+) -> tuple[NDArray[np.int32], NDArray[np.uint32], IntArray]:
+    """Where points lie on a grid turned by each angle: cells (A, 2, K), places (A, K), boxes (A, 4).
+
+    ``corner`` is the grid's x and y and its cells' side, ``shift`` what is added to columns and rows; for
+    places and boxes see ``_score``.
+    """
+    count, turns = points_xy.shape[0], angles_rad.shape[0]
+    cells = np.empty((turns, 2, count), np.int32)
+    places = np.empty((turns, count), np.uint32)  # without a sign: none is counted from the end
+    boxes = np.empty((turns, 4), np.int64)
+    corner_x, corner_y, cell_m = corner
+    for a in range(turns):
+        theta = centre[2] + angles_rad[a]
+        c, s = math.cos(theta), math.sin(theta)
+        k = 0
+        # Neighbours on one wall tell alike: points from all over settle sooner what a pose is not.
+        for first in range(_SPREAD):
+            for p in range(first, count, _SPREAD):
+                x = centre[0] + c * points_xy[p, 0] - s * points_xy[p, 1]
+                y = centre[1] + s * points_xy[p, 0] + c * points_xy[p, 1]
+                cells[a, 0, k] = math.floor((x - corner_x) / cell_m) + shift
+                cells[a, 1, k] = math.floor((y - corner_y) / cell_m) + shift
+                k += 1
+        boxes[a, 0], boxes[a, 1] = cells[a, 0].min(), cells[a, 0].max()
+        boxes[a, 2], boxes[a, 3] = cells[a, 1].min(), cells[a, 1].max()
+        for k in range(count):
+            places[a, k] = (cells[a, 1, k] - boxes[a, 2]) * columns + cells[a, 0, k] - boxes[a, 0]
+    return cells, places, boxes
+
+
+@kernel
+def _is_passed_over(x: float, y: float, theta: float, away: FloatArray) -> bool:
+    """Whether a pose is among those that ``away`` of ``search_window`` does not count."""
+    if away[3] < 0.0:
+        return False
+    ex, ey = x - away[0], y - away[1]
+    et = theta - away[2]
+    et = abs(et - 2.0 * math.pi * math.floor(et / (2.0 * math.pi) + 0.5))
+    along = ex * away[5] + ey * away[6]
+    ex, ey = ex - along * away[5], ey - along * away[6]
+    return bool(ex * ex + ey * ey < away[3] * away[3] and et < away[4])
+
+
+@kernel
 def search_window(
     pyramid: ScoreArray,
     margin: int,
@@ -141,27 +192,12 @@ def search_window(
     stride = 1 << levels
     roots_side = (width + stride - 1) // stride
     roots = angles_rad.shape[0] * roots_side * roots_side
-    cells = np.empty((angles_rad.shape[0], 2, count), np.int32)
-    places = np.empty((angles_rad.shape[0], count), np.uint32)  # without a sign: none is counted from the end
-    boxes = np.empty((angles_rad.shape[0], 4), np.int64)
     bounds = np.empty(roots)
     nodes = 0
-    for a in range(angles_rad.shape[0]):
-        theta = centre[2] + angles_rad[a]
-        c, s = math.cos(theta), math.sin(theta)
-        k = 0
-        # Neighbours on one wall tell alike: points from all over settle sooner what a pose is not.
-        for first in range(_SPREAD):
-            for p in range(first, count, _SPREAD):
-                x = centre[0] + c * points_xy[p, 0] - s * points_xy[p, 1]
-                y = centre[1] + s * points_xy[p, 0] + c * points_xy[p, 1]
-                cells[a, 0, k] = math.floor((x - corner_x) / cell_m) - reach + margin
-                cells[a, 1, k] = math.floor((y - corner_y) / cell_m) - reach + margin
-                k += 1
-        boxes[a, 0], boxes[a, 1] = cells[a, 0].min(), cells[a, 0].max()
-        boxes[a, 2], boxes[a, 3] = cells[a, 1].min(), cells[a, 1].max()
-        for k in range(count):
-            places[a, k] = (cells[a, 1, k] - boxes[a, 2]) * pyramid.shape[2] + cells[a, 0, k] - boxes[a, 0]
+    corner = corner_x, corner_y, cell_m
+    cells, places, boxes = _turned_cells(
+        points_xy, centre, angles_rad, corner, margin - reach, pyramid.shape[2]
+    )
     least = least_score * count
     if seed[0] == seed[0]:
         a = int(np.argmin(np.abs(angles_rad - (seed[2] - centre[2]))))
@@ -204,14 +240,8 @@ def search_window(
             y = centre[1] + (row - reach) * cell_m
             theta = centre[2] + angles_rad[a]
             if level == 0:
-                if away[3] >= 0.0:
-                    ex, ey = x - away[0], y - away[1]
-                    et = theta - away[2]
-                    et = abs(et - 2.0 * math.pi * math.floor(et / (2.0 * math.pi) + 0.5))
-                    along = ex * away[5] + ey * away[6]
-                    ex, ey = ex - along * away[5], ey - along * away[6]
-                    if ex * ex + ey * ey < away[3] * away[3] and et < away[4]:
-                        continue
+                if _is_passed_over(x, y, theta, away):
+                    continue
                 least = stack_bound[top]
                 best[0], best[1], best[2], best[3] = x, y, theta, least / count
                 if any_will_do:
