@@ -20,12 +20,16 @@ from pilotage.missions.mission import Mission
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.stack.control.local.drive import LocalDrive
 from pilotage.stack.exploration.floor_frontiers import SeenFloor
-from pilotage.stack.interface import Belief, BeliefStatus
+from pilotage.stack.interface import Belief, BeliefStatus, StackStatus
 from pilotage.stack.journal import Journal
+from pilotage.stack.localization.localizer import Localizer
 from pilotage.stack.mapping.scan_grid import ScanGrid, echoes
-from pilotage.stack.navigator.floor_explorer import Doing, FloorExplorer
-from pilotage.stack.navigator.floor_explorer_config import FloorExplorerConfig
-from pilotage.stack.navigator.frontier_targets import Target, Targets
+from pilotage.stack.navigator.floor_explorer import decisions
+from pilotage.stack.navigator.floor_explorer.config import FloorExplorerConfig
+from pilotage.stack.navigator.floor_explorer.context import Context, led_to
+from pilotage.stack.navigator.floor_explorer.own_floor import OwnFloor
+from pilotage.stack.navigator.floor_explorer.states import Closing, Done, Exploring, Returning, State
+from pilotage.stack.navigator.floor_explorer.targets import Target, Targets
 from support.laser_rooms import furnished, ranges, room
 from support.missions import MISSIONS
 from support.robots import ROOM
@@ -36,6 +40,11 @@ BOUNDS_M = (0.0, 0.0, 8.0, 4.0)
 
 def floor_of(states: np.ndarray, here: np.ndarray = HERE) -> SeenFloor:
     return SeenFloor(states.astype(np.int8), np.zeros(2), 0.05, 0.3, here)
+
+
+def own_floor(grid: object, start_m: np.ndarray, radius_m: float) -> OwnFloor:
+    """What a robot of that radius makes of a grid."""
+    return OwnFloor(FloorExplorerConfig(), LidarConfig(), cast(ScanGrid, grid), start_m, radius_m)
 
 
 def half_seen() -> np.ndarray:
@@ -98,9 +107,7 @@ def test_who_is_cut_off_by_its_clearance_is_led_back_by_what_its_body_takes() ->
         states[34 : 34 + cells, 78:82] = FREE
         grid = SimpleNamespace(states=states.astype(np.int8), corner_xy_m=np.zeros(2), resolution_m=0.05)
         grid.wall_points = lambda: np.zeros((0, 2))
-        explorer = FloorExplorer.__new__(FloorExplorer)
-        vars(explorer).update(_grid=grid, _start=HERE, _clearance_m=0.36, _radius_m=0.3, _squeeze_m=0.03)
-        floor = explorer._seen(np.array([5.5, 2.0]))
+        floor = own_floor(grid, HERE, 0.3).seen(np.array([5.5, 2.0]))
         return bool(np.isfinite(floor.cost_to(HERE)))
 
     assert reached(20)
@@ -116,16 +123,9 @@ def test_who_stalls_is_led_by_what_a_line_with_room_leads_to() -> None:
     states[16:26, 78:80] = FREE
     floor, here = floor_of(states), np.array([3.0, 1.0])
     path = floor.path_to(np.array([5.0, 1.0]))
-    explorer = SimpleNamespace(_stalled_at=None, _floor=floor)
-
-    def led() -> tuple[float, float]:
-        return FloorExplorer._led_to(cast(FloorExplorer, explorer), path, here)
-
-    around = led()
+    around, nearer = led_to(path, here, None), led_to(path, here, floor)
     assert not floor.has_room(here, np.array([5.0, 1.0]))
     assert floor.has_room(here, np.array([1.0, 2.0]))
-    explorer._stalled_at = here
-    nearer = led()
     assert np.hypot(*(np.array(nearer) - here)) > 0.3
     assert floor.has_room(here, np.array(nearer))
     assert not floor.has_room(here, np.array(around))
@@ -238,16 +238,16 @@ def unknown_floor(walls_m: list[list[float]], start: Pose2, radius_m: float, see
 
 def test_a_frontier_that_a_look_does_not_move_is_driven_through(monkeypatch: pytest.MonkeyPatch) -> None:
     """The next room is in the shadow of a door post: with looks alone it came home with 47 % mapped."""
-    met = FloorExplorer._met
+    met = decisions.meet
     sides: list[list[float]] = [[0, 1, 5, 1], [5, 1, 5, 5], [5, 5, 0, 5], [0, 5, 0, 1], [2.1, 1, 2.1, 4]]
     mission = unknown_floor(sides, Pose2(0.53, 2.73, 2.03), 0.15, 1)
     once: list[Target] = []
 
-    def noted(explorer: FloorExplorer, target: Target) -> None:
+    def noted(context: Context, target: Target) -> None:
         once.append(target)
-        met(explorer, target)
+        met(context, target)
 
-    monkeypatch.setattr(FloorExplorer, "_met", noted)
+    monkeypatch.setattr(decisions, "meet", noted)
     metrics = run_mission(mission, save=False).metrics
     assert metrics["success"] is True, metrics["reason"]
     assert float(str(metrics["floor_mapped"])) > 0.99
@@ -285,59 +285,68 @@ def test_a_room_behind_a_gap_that_the_body_alone_takes_is_explored() -> None:
     assert metrics["collisions"] == 0
 
 
+def deciding(floor: SeenFloor, monkeypatch: pytest.MonkeyPatch) -> Context:
+    """An explorer that sees this floor, whichever clearance it asks for, and began at ``HERE``."""
+    grid = SimpleNamespace(poses=np.tile([*HERE, 0.0], (4, 1)))
+    config, own = FloorExplorerConfig(), own_floor(grid, HERE, 0.3)
+    for look in ("seen", "widest"):
+        monkeypatch.setattr(own, look, lambda _: floor)
+    localizer = cast(Localizer, SimpleNamespace())
+    return Context(config, own, Targets(config, 25.0), localizer, 1.0, Journal())
+
+
+def at(here: np.ndarray, status: BeliefStatus) -> Belief:
+    return Belief(Pose2(float(here[0]), float(here[1]), 0.0), np.zeros((3, 3)), status)
+
+
 def test_who_is_under_way_to_a_gap_goes_on_where_what_it_sees_behind_it_shrinks(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """It was 1.7 m from afar and under 1 m from before the gap, where the robot turned back."""
     asked: list[float] = []
-    explorer = FloorExplorer.__new__(FloorExplorer)
     floor, seen_m = floor_of(half_seen()), [1.7, 0.6]
-    found = SimpleNamespace(xy_m=np.array([2.0, 2.0]))
+    found = Target(np.array([2.0, 2.0]), np.array([2.5, 2.0]), 0.0, False)
 
-    def worth_it(*asking: object) -> list[object]:
+    def worth_it(*asking: object) -> list[Target]:
         least_m = cast(float, asking[-1])
         asked.append(least_m)
         return [found] if len(asked) % 2 == 0 and seen_m[len(asked) // 2 - 1] >= least_m else []
 
-    belief = Belief(Pose2(0.0, 0.0, 0.0), np.zeros((3, 3)), BeliefStatus.LOCALIZED)
-    vars(explorer).update(_doing=Doing.EXPLORE, _least_m=0.4, _squeezing=False, _radius_m=0.3)
-    vars(explorer).update(_config=SimpleNamespace(unsure_m=1.0), _sure_m=0.0, _target=None, _searched=0)
-    vars(explorer).update(_squeeze_m=0.0, _grid=SimpleNamespace(wall_points=lambda: None))
-    vars(explorer).update(_targets=SimpleNamespace(worth_it=worth_it))
-    went: list[object] = []
-    monkeypatch.setattr(FloorExplorer, "_seen", lambda *_: floor)
-    monkeypatch.setattr(FloorExplorer, "_floor_at", lambda *_: floor)
-    monkeypatch.setattr(FloorExplorer, "_watch", lambda *_: None)
-    monkeypatch.setattr(FloorExplorer, "_go_exploring", lambda *_: went.append("on"))
-    monkeypatch.setattr(FloorExplorer, "_set_out_home", lambda *_: went.append("home"))
+    context = deciding(floor, monkeypatch)
+    monkeypatch.setattr(context.targets, "worth_it", worth_it)
+    state: State = Exploring()
     for _ in range(2):
-        explorer._decide(0.0, belief, HERE)
-    assert went == ["on", "on"]
+        state = decisions.decide(context, state, 0.0, at(HERE, BeliefStatus.LOCALIZED))
+        assert state == Exploring(found)
     assert asked == [0.4, 1.0, 0.4, 0.4]
 
 
 def test_who_is_lost_goes_back_to_where_it_knew_its_place(monkeypatch: pytest.MonkeyPatch) -> None:
     """With a laser of 3.5 m one left a house, saw nothing that it knew, and stood there to the end."""
-    explorer, floor = FloorExplorer.__new__(FloorExplorer), floor_of(half_seen(), np.array([3.4, 2.0]))
+    here = np.array([3.4, 2.0])
     seen = Target(np.array([3.5, 2.5]), np.array([3.9, 2.5]), 0.0, True)
-    targets = Targets(FloorExplorerConfig(), 25.0)
-    monkeypatch.setattr(targets, "worth_it", lambda *_: [seen])
-    vars(explorer).update(
-        _doing=Doing.EXPLORE, _least_m=0.4, _squeezing=False, _target=seen, _targets=targets
-    )
-    vars(explorer).update(_config=FloorExplorerConfig(), _sure_m=0.0, _searched=0, _journal=Journal())
-    vars(explorer).update(_grid=SimpleNamespace(poses=np.tile([*HERE, 0.0], (4, 1))))
-    monkeypatch.setattr(FloorExplorer, "_seen", lambda *_: floor)
-    monkeypatch.setattr(FloorExplorer, "_watch", lambda *_: None)
-    pose, cov = Pose2(3.4, 2.0, 0.0), np.zeros((3, 3))
-    lost, known = (Belief(pose, cov, status) for status in (BeliefStatus.LOST, BeliefStatus.LOCALIZED))
-    here, doing = np.array([3.4, 2.0]), []
-    for belief in (known, lost, lost, known):
-        explorer._decide(0.0, belief, here)
-        doing.append(explorer._doing)
-        assert explorer._target is not None
-    assert doing == [Doing.EXPLORE, Doing.CLOSE, Doing.CLOSE, Doing.EXPLORE]
-    assert len(targets._tried) == 1
+    context = deciding(floor_of(half_seen(), here), monkeypatch)
+    monkeypatch.setattr(context.targets, "worth_it", lambda *_: [seen])
+    lost, known = at(here, BeliefStatus.LOST), at(here, BeliefStatus.LOCALIZED)
+    state: State = Exploring(seen)
+    for belief, then in ((known, Exploring), (lost, Closing), (lost, Closing), (known, Exploring)):
+        state = decisions.decide(context, state, 0.0, belief)
+        assert type(state) is then
+        assert state.target is not None
+    assert len(context.targets._tried) == 1
+
+
+def test_who_cannot_come_back_says_so_and_decides_nothing_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    here = np.array([3.4, 2.0])
+    context = deciding(floor_of(half_seen(), here), monkeypatch)
+    monkeypatch.setattr(context, "stalled_s", lambda *_: 1e9)
+    state: State = Returning()
+    for stalls in range(1, decisions.HOME_STALLS + 1):
+        assert isinstance(state, Returning)
+        state = decisions.decide(context, state, float(stalls), at(here, BeliefStatus.LOCALIZED))
+    assert state == Done()
+    assert context.status is StackStatus.FAILED
+    assert "stuck on its way back" in context.reason
 
 
 def test_who_turned_back_twice_on_its_way_to_a_frontier_gives_it_up() -> None:
@@ -400,9 +409,7 @@ def test_gaps_are_told_by_where_walls_are_and_not_by_cells(
 def test_who_squeezed_through_a_slanting_gap_is_led_back(turned_rad: float) -> None:
     """Cells shut it even for a body smaller by one of them: one came home with "no path leads back"."""
     grid, start, here = gap_seen(0.17 + 0.025, turned_rad)
-    explorer = FloorExplorer.__new__(FloorExplorer)
-    vars(explorer).update(_grid=grid, _start=start, _clearance_m=0.23, _radius_m=0.17, _squeeze_m=0.03)
-    assert np.isfinite(explorer._seen(here).cost_to(start))
+    assert np.isfinite(own_floor(grid, start, 0.17).seen(here).cost_to(start))
 
 
 def test_floor_behind_a_gap_counts_by_the_gap_and_not_by_the_lattice() -> None:

@@ -8,7 +8,7 @@ import pytest
 from pilotage.kernels.grids.most_room import most_room
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.stack.mapping.scan_grid import BeamEnds, ScanGrid, echoes
-from pilotage.stack.navigator.getting_on import GettingOn
+from pilotage.stack.navigator.floor_explorer.getting_on import GettingOn
 from support.laser_rooms import furnished, ranges
 
 TARGET = np.array([10.0, 0.0])

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from pilotage.core.types import FloatArray
-from pilotage.stack.navigator.frontier_targets import SAME_M
+from pilotage.stack.navigator.floor_explorer.targets import SAME_M
 
 STALL_M = 0.3
 """Less than this, of place or of the path to go, is no getting on."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.stack.exploration.floor_frontiers import Frontier, SeenFloor
-from pilotage.stack.navigator.floor_explorer_config import FloorExplorerConfig
+from pilotage.stack.navigator.floor_explorer.config import FloorExplorerConfig
 
 SAME_M = 0.6
 """A frontier this near to one that was looked at is that one."""
