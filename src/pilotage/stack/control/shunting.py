@@ -34,7 +34,7 @@ class Shunting:
         self._allows, self._dt_s = allows, robot.dt_s
         self._speed_m_s = min(SPEED_M_S, robot.motion.top_speed_m_s)
         self._per_m = 1.0 / robot.motion.least_turning_radius_m
-        self._sees_behind = any(_looks_back(sheet) for sheet in robot.sensors_of(LidarConfig).values())
+        self._sees_behind = any(looks_back(sheet) for sheet in robot.sensors_of(LidarConfig).values())
         self._ahead, self._leg_m = True, 0.0
 
     def begin(self) -> None:
@@ -63,7 +63,7 @@ class Shunting:
         self._ahead, self._leg_m = self._ahead != self._sees_behind, 0.0
 
 
-def _looks_back(sheet: LidarConfig) -> bool:
+def looks_back(sheet: LidarConfig) -> bool:
     """Whether its beams cover what is straight behind the robot."""
     angles_rad = np.sort(np.mod(sheet.mount.theta_rad + sheet.beam_angles_rad(), 2.0 * math.pi))
     behind = angles_rad[np.abs(angles_rad - math.pi) <= BEHIND_RAD]

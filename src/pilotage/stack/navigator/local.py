@@ -16,6 +16,7 @@ from pilotage.stack.control.give_way import GiveWay, GiveWayConfig
 from pilotage.stack.control.last_word import LastWord
 from pilotage.stack.control.local.drive import LocalDrive
 from pilotage.stack.control.make_room import MakeRoom, MakeRoomConfig
+from pilotage.stack.control.step_clear import StepClear
 from pilotage.stack.control.wander import WanderConfig
 from pilotage.stack.interface import NAVIGATORS, Belief, BeliefStatus, StackStatus
 from pilotage.stack.journal import Journal
@@ -107,6 +108,7 @@ class LocalNavigator(LocalizingNavigator):
         )
         super().__init__(localizer, journal)
         self._last_word = LastWord(robot)
+        self._step_clear = StepClear(robot, self._last_word)
         self._wandering = Wandering(config.wander, robot, localizer, self._last_word)
         self._bodies = MovingBodies(
             config.moving_bodies, robot, chart, mates=task.mates, unexplained=unexplained_of(parts)
@@ -173,9 +175,14 @@ class LocalNavigator(LocalizingNavigator):
         # Weak brakes would carry it through the goal: it stops first, and comes back.
         there = not (led or off_rad) and (abs(self._drive.rolls_m()) <= self._task.goal_tolerance_m)
         self._tell(readings.t_s, there=there)
-        if self._status is not StackStatus.RUNNING or not self._last_word.allows(command):
+        if self._status is not StackStatus.RUNNING:
             return STOP
-        return command
+        mapped_m = None if self._plan is None else self._plan.mapped_m
+
+        def leaves_alone(step: Twist) -> bool:
+            return mapped_m is None or self._gives_way.allows(step, pose, mapped_m)
+
+        return self._step_clear.instead_of(command, readings.t_s, leaves_alone)
 
     def _is_lost(self, t_s: float, belief: Belief) -> bool:
         """Whether it does not know where it is any more; before its first plan the plan waits to know."""

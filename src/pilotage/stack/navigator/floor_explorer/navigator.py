@@ -14,6 +14,7 @@ from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, Readings
 from pilotage.stack.control.last_word import LastWord
 from pilotage.stack.control.local.drive import LocalDrive
+from pilotage.stack.control.step_clear import StepClear
 from pilotage.stack.interface import NAVIGATORS, Belief, StackStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
@@ -75,6 +76,7 @@ class FloorExplorer:
             needed_by="navigator 'floor-frontier'",
         )
         self._last_word = LastWord(robot)
+        self._step_clear = StepClear(robot, self._last_word)
         scans = Abilities.of(self._localizer).scan_grid
         self._own = OwnFloor(config, scanner, scans, np.array([start.x_m, start.y_m]), robot.radius_m)
         targets, top_speed_m_s = Targets(config, scanner.max_range_m), robot.motion.top_speed_m_s
@@ -120,4 +122,4 @@ class FloorExplorer:
             return STOP
         tolerance_m = 0.5 * self._state.within_m(context.config)
         command = self._drive.toward(context.led_to(target.path, here), belief, readings, tolerance_m)
-        return command if self._last_word.allows(command) else STOP
+        return self._step_clear.instead_of(command, t_s)
