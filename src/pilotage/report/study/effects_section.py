@@ -10,7 +10,6 @@ from typing import Any
 from pilotage.evaluation.effects import FEWEST
 from pilotage.evaluation.metric import words_and_unit
 from pilotage.evaluation.metrics import METRICS
-from pilotage.experiments.studies.cells import show
 from pilotage.experiments.studies.findings import SETTING, Best, Finding
 from pilotage.experiments.studies.table import StudyTable
 from pilotage.report import markup
@@ -77,7 +76,7 @@ def level_words(table: StudyTable, factor: str, level: Any) -> str:
     if factor == SETTING:
         return next((cell.text for cell in table.cells if cell.name == level), str(level))
     unit = table.unit(factor)
-    text = show(level)
+    text = table.study.definition.said(factor, level)
     return f"{text}\u00a0{unit}" if unit and isinstance(level, int | float) else text
 
 

@@ -15,7 +15,7 @@ from pilotage.core.types import FloatArray
 from pilotage.evaluation.intervals import Summary
 from pilotage.evaluation.judge import Judgement
 from pilotage.evaluation.metric import words_and_unit
-from pilotage.experiments.studies.cells import Cell, show
+from pilotage.experiments.studies.cells import Cell
 from pilotage.experiments.studies.groups import CellGroup
 from pilotage.experiments.studies.table import StudyTable
 from pilotage.report.light_axes import LightAxes
@@ -96,10 +96,9 @@ def _kept_apart(value: object) -> float | str:
 
 def _said(table: StudyTable, factor: str, value: object) -> str:
     """A factor's value with its name and its unit; a level or a configuration by its own name."""
-    if isinstance(value, str):
-        return value
     if not _is_number(value):
-        return f"{words_and_unit(factor)[0]} {show(value)}"
+        said = table.study.definition.said(factor, value)
+        return said if isinstance(value, str) else f"{words_and_unit(factor)[0]} {said}"
     unit = table.unit(factor)
     return f"{words_and_unit(factor)[0]} {value:g}{f' {unit}' if unit else ''}"
 
