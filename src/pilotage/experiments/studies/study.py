@@ -16,6 +16,7 @@ import yaml
 
 from pilotage.core.config import validate
 from pilotage.core.errors import InputError, unknown_name
+from pilotage.core.file_kinds import check_kind
 from pilotage.core.files import decoded, read_bytes
 from pilotage.core.plugins import PluginError, is_package
 from pilotage.experiments.mission import mission_of, read_mission, shipped_missions
@@ -144,6 +145,7 @@ def load_study(
         values = parse_yaml((SHIPPED / f"{name_or_path}.yaml").read_text(encoding="utf-8"), name_or_path)
     else:
         raise unknown_name("study", name_or_path, shipped_studies())
+    check_kind(values, "study", name_or_path)
     try:
         of_a_mission = Mission.model_fields.keys() - StudyDefinition.model_fields.keys()
         for key in sorted(of_a_mission & values.keys()):
