@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import math
+import re
 import sqlite3
 from pathlib import Path
 from unittest.mock import Mock
@@ -21,6 +22,7 @@ from pilotage.experiments.course_families import Course, Driver, make_course_of
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.models.footprint import Footprint
 from pilotage.models.motion.differential_drive import DifferentialDriveConfig
+from pilotage.report.barn.controllers import ControllersPage, controllers_page
 from support.fuzz_targets import BY_NAME
 
 JACKAL = np.array([[0.254, 0.215], [-0.254, 0.215], [-0.254, -0.215], [0.254, -0.215]])
@@ -224,3 +226,25 @@ def test_bad_input_is_one_line(
     assert words in said.err
     assert len(said.err.splitlines()) == 1
     assert not (tmp_path / "out").exists()
+
+
+def test_the_page_names_whose_numbers_it_begins_with() -> None:
+    """Of controllers that all arrive the first one's numbers stood there, whoever was faster."""
+
+    def runs(good: bool, time_s: float) -> list[CourseRun]:
+        return [CourseRun("doors", k, 0, good, False, not good, time_s + 0.1 * k, 2.0) for k in range(7)]
+
+    times_s = {"lost": 9.0, "slow": 3.0, "fast": 2.2, "off": 8.0}
+    made = {name: runs(time_s < 5.0, time_s) for name, time_s in times_s.items()}
+    page = controllers_page(ControllersPage(made, {}))
+    headline = re.search(
+        r"fast: 100\.0.% of 7 runs on 7 courses arrive at (\S+) times the bound; slow: ", page
+    )
+    assert headline is not None
+    assert float(headline[1]) == pytest.approx(2.5 / 2.0)
+    assert "lost: 0.0\u00a0% of 7 runs on 7 courses arrive; off: " in page
+    assert re.search(r"best controller</\w+>\s*<\w+>fast<", page)
+    assert "1 is out of reach, less is better" in page
+    # Signs are those of the rest of the page.
+    apart = controllers_page(ControllersPage({name: made[name] for name in ("slow", "fast")}, {}))
+    assert "−0.80 to −0.80" in apart

@@ -13,6 +13,7 @@ import yaml
 from pilotage.core.errors import InputError
 from pilotage.core.yaml_text import load_yaml
 from pilotage.evaluation.metrics import METRICS
+from pilotage.experiments import recorder
 from pilotage.experiments.build.charts import load_chart
 from pilotage.experiments.mission import load_mission
 from pilotage.experiments.roles import ROLES
@@ -58,6 +59,24 @@ def test_files_that_are_named_are_there() -> None:
         if not ((ROOT / path).exists() or (ROOT / "src/pilotage" / path).exists())
     ]
     assert missing == []
+
+
+def test_every_column_of_a_trace_is_told_of() -> None:
+    """Of what our components declare, as texts with a unit; students plot them."""
+    told = (ROOT / "docs/run-folder.md").read_text()
+    declared = re.compile(r'"([a-z]\w*)": "(?:1|m|s|rad|rad/s|m/s|m\^2)"')
+    sources = [(path, path.read_text()) for path in (ROOT / "src/pilotage/stack").rglob("*.py")]
+    names = {
+        name
+        for _, text in sources
+        if "COLUMNS" in text or "channel(" in text
+        for name in declared.findall(text)
+    }
+    names |= {
+        name for name in vars(recorder) if name.endswith("_COLUMNS") for name in getattr(recorder, name)
+    }
+    assert len(names) > 50
+    assert sorted(name for name in names if not name.startswith("region_") and f"`{name}`" not in told) == []
 
 
 def test_every_component_and_every_metric_is_told_of() -> None:

@@ -257,3 +257,15 @@ def test_too_few_trials_tell_nothing() -> None:
 def test_holms_correction_by_hand() -> None:
     assert holm([0.01, 0.04, math.nan, 0.03]) == pytest.approx([0.03, 0.06, math.nan, 0.06], nan_ok=True)
     assert holm([]) == []
+
+
+def test_an_interaction_is_told_where_levels_in_no_order_differ_most() -> None:
+    """A controller that is slower on one map of three: told between the other two it was a change of +0."""
+    rng = np.random.default_rng(9)
+    values = 0.01 * rng.normal(size=(12, 2, 3))
+    values[:, 1, 1] += 1.0
+    for ordered, ends, change in (([False, False], (0, 1), 1.0), ([False, True], (0, 2), 0.0)):
+        found = effects(values, ordered=ordered, paired=True)[-1]
+        assert found.p_value < 0.01
+        assert found.ends == ends
+        assert found.change().mean == pytest.approx(change, abs=0.02)

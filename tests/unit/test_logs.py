@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import math
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -285,3 +286,28 @@ def test_heading_logs_are_told_by_their_names(tmp_path: Path) -> None:
     assert gyro.values[0, 2] == pytest.approx(math.pi)
     with pytest.raises(InputError, match="to know the sensor"):
         read_heading_log(folder / "other.csv")
+
+
+def test_a_table_of_ones_own_becomes_a_log_as_the_docs_say(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nothing said how to bring a recording in a format of one's own; the page's program does."""
+    page = (Path(__file__).parents[2] / "docs/slam.md").read_text()
+    (program,) = re.findall(r"```python\n# to_carmen.py\n(.*?)```", page, re.DOTALL)
+    head = ["time_ms", "x_cm", "y_cm", "yaw_deg", "r0_mm", "r1_mm", "r2_mm"]
+    rows = [
+        ["1500", "100", "-200", "90", "1000", "2500", "30000"],
+        ["2000", "110", "-200", "0", "1", "2", "3"],
+    ]
+    (tmp_path / "my log.csv").write_text("\n".join(";".join(row) for row in [head, *rows]) + "\n")
+    monkeypatch.chdir(tmp_path)
+    exec(program, {})
+    log = read_carmen(tmp_path / "my.log")
+    np.testing.assert_allclose(log.t_s, [1.5, 2.0])
+    np.testing.assert_allclose(log.ranges_m[0], [1.0, 2.5, 30.0])
+    np.testing.assert_allclose(log.angles_rad(0), np.radians([-90, -89, -88]))
+    np.testing.assert_allclose(log.robot_poses[0], [1.0, -2.0, np.pi / 2])
+    np.testing.assert_allclose(log.laser_poses, [[1.0, -1.8, np.pi / 2], [1.3, -2.0, 0.0]])
+    np.testing.assert_allclose(log.odometry, log.robot_poses)
+    with pytest.raises(InputError, match=r"docs/slam\.md shows how to write them"):
+        read_carmen(tmp_path / "my log.csv")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -47,6 +48,13 @@ def test_an_example_of_ones_own_runs_at_once(
     assert main(["run", f"{own}.yaml", "--quiet", "--no-report"]) == 0
     assert main(["new", kind, own]) == BAD_INPUT
     assert "there already" in capsys.readouterr().err
+
+
+def test_a_new_mission_names_components_that_there_are(tmp_path: Path) -> None:
+    """It told to type `components` with its own name, which is no component's."""
+    assert main(["new", "mission", "week-1", "--out", str(tmp_path)]) == 0
+    named = re.findall(r"`components ([^`]+)`", (tmp_path / "week-1.yaml").read_text())
+    assert [main(["components", name]) for name in named] == [0]
 
 
 @pytest.mark.parametrize(

@@ -73,6 +73,24 @@ def test_without_a_plan_it_ends_and_says_so() -> None:
     assert "least_length_m" not in metrics
 
 
+def test_who_never_drove_is_held_against_no_least_way() -> None:
+    """A run without a plan had driven 0.000 of the least path in 0.000 of its time: the best there can be."""
+    wide = {
+        "stack.planner": {"name": "rrt-star-dubins", "iterations": 1},
+        "stack.navigator": {"name": "goal"},
+    }
+    parts = {
+        "stack.local_controller": None,
+        "stack.local_planner": "dubins",
+        "stack.controller": "pi-follower",
+    }
+    metrics = driven(mission((), **wide, **parts))
+    assert not metrics["success"]
+    assert metrics["steps"] == 0
+    assert metrics["least_length_m"] > 6.0
+    assert not {"driven_over_least", "time_over_least"} & metrics.keys()
+
+
 def test_where_the_way_is_shut_by_what_it_finds_it_gives_up_and_says_so() -> None:
     shut = {"kind": "box", "from_m": [4.0, 4.4], "to_m": [4.0, 6.0], "thickness_m": 0.2}
     more = {

@@ -37,6 +37,7 @@ from pilotage.report.figures.placing import LabelPlacer, along
 from pilotage.report.headline import headline
 from pilotage.report.light_axes import LightAxes
 from pilotage.report.markup import Html, escape, page, table
+from pilotage.report.replay.floor import floor_scene
 from pilotage.report.series import band, decimate, merge_spans, running_mean, spans
 from pilotage.report.team import colour_of, team_section
 from support.browser import Browser
@@ -200,6 +201,23 @@ def test_map_shows_the_whole_floor_or_the_part_that_matters(tmp_path: Path) -> N
     assert part[0] > -20.0
     assert part[3] < 30.0
     assert "Only the part of the floor around the run is shown." in page_of(run)
+
+
+def test_a_recording_without_a_truth_is_shown_where_it_believed_to_be(tmp_path: Path) -> None:
+    """A map showed two metres around the start of a drive through a whole building."""
+    columns: dict[str, Any] = dict.fromkeys(("true_x_m", "true_y_m", "true_theta_rad", "nees"))
+    localized = np.ones(200)
+    localized[150:] = 0.0
+    x_m = np.where(localized > 0.0, np.linspace(1.0, 19.0, 200), 1e4)
+    told = {**columns, "est_x_m": x_m, "localized": localized}
+    run = read_run(fabricate_run(tmp_path / "run", steps=200, plans=None, columns=told))
+    limits = view_limits(run)
+    assert limits is not None
+    assert limits[0] < 1.0
+    assert x_m[:150].max() < limits[2] < 100.0
+    scene = floor_scene(run)
+    assert scene is not None
+    assert scene.series[0].title == "95 % half axis of position"
 
 
 @pytest.mark.parametrize(

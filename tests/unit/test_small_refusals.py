@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pilotage.cli.main import main
 from pilotage.cli.options import parse_seed
 from pilotage.core.errors import InputError
 from pilotage.core.whole_number import whole_number
@@ -269,3 +270,33 @@ def test_a_laser_too_coarse_for_a_team_is_refused(settings: list[str], least: in
     with pytest.raises(InputError, match=words):
         build(load_mission("museum-patrol", settings, 0))
     build(load_mission("museum-patrol", [*settings, "team.size=1"], 0))
+
+
+@pytest.mark.parametrize(
+    ("command", "file", "told"),
+    [
+        (
+            ["run"],
+            "study: a\nmission: museum-1\n",
+            "expected a mission, found a study; 'pilotage study' takes it",
+        ),
+        (
+            ["run"],
+            "walls_m: []\n",
+            "expected a mission, found a map; 'pilotage draw' takes it, and world.map",
+        ),
+        (["run"], "image: a.png\nresolution: 0.05\n", "expected a mission, found a map;"),
+        (["sweep"], "study: a\n", "expected a mission, found a study;"),
+        (["study"], "extends: museum-1\n", "expected a study, found a mission; 'pilotage run' takes it"),
+        (["draw"], "extends: museum-1\n", "expected a map, found a mission;"),
+        (["plan", "--start", "1,1", "--goal", "2,2"], "study: a\n", "expected a map, found a study;"),
+    ],
+)
+def test_a_file_of_another_kind_is_told_as_what_it_is(
+    command: list[str], file: str, told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A mission that was drawn was refused for "extends: unknown key", a study that was run for "study"."""
+    path = tmp_path / "mine.yaml"
+    path.write_text(file)
+    assert main([*command, str(path)]) == 2
+    assert f"mine.yaml: {told}" in capsys.readouterr().err

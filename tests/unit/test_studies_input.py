@@ -27,6 +27,7 @@ from pilotage.experiments.studies.study import (
     mission_yaml,
     study_yaml,
 )
+from pilotage.experiments.studies.sweep import sweep_study
 from pilotage.experiments.studies.trial import TrialRunner
 from pilotage.records.folder import STUDY_FILE
 
@@ -397,3 +398,51 @@ def test_a_cell_of_a_file_is_named_as_the_study_names_it(world: Path) -> None:
     (world / STUDY_FILE).write_text(study_yaml(study), encoding="utf-8")
     (world / MISSION_FILE).write_text(mission_yaml(study), encoding="utf-8")
     assert load_study(str(world)).definition.baseline == study.definition.baseline
+
+
+def test_factors_are_called_by_what_tells_them_apart() -> None:
+    """Two components by their names were refused as "'name' stands twice", which `sweep` cannot change."""
+    vary = [
+        "stack.localizer.name=ekf-landmarks,ukf-landmarks",
+        "stack.planner.name=rrt-star-dubins",
+        "world.goal.tolerance_m=0.3",
+        "world.goal.x_m=2",
+        "world.start.x_m=1",
+    ]
+    made = sweep_study("museum-1", vary, [], 1, [])
+    assert made.cells[0].name == (
+        "localizer=ekf-landmarks, planner=rrt-star-dubins, tolerance_m=0.3, goal_x_m=2, start_x_m=1"
+    )
+    assert made.cells[0].text == (
+        "ekf-landmarks, rrt-star-dubins, tolerance 0.3\u00a0m, goal x 2\u00a0m, start x 1\u00a0m"
+    )
+
+
+def test_maps_of_ones_own_go_by_the_ends_of_their_paths(tmp_path: Path) -> None:
+    """Cells, findings and figures called them by their whole absolute paths."""
+    for name in ("a b/one.yaml", "c/one.yaml", "c/two.yaml"):
+        file = tmp_path / name
+        file.parent.mkdir(exist_ok=True)
+        file.write_text("walls_m: [[0, 0, 9, 0], [9, 0, 9, 9], [9, 9, 0, 9], [0, 9, 0, 0]]\n")
+    names = ["a b/one.yaml", "c/one.yaml", "museum"]
+    values = {
+        "study": "maps",
+        "mission": "museum-1",
+        "set": {"world.goal.y_m": 8, "world.obstacles": []},
+        "factors": [{"key": "world.map", "values": names}],
+        "baseline": "map=c/one.yaml",
+        "published": [{"cell": {"map": "a b/one.yaml"}, "metrics": {"duration_s": 1}}],
+    }
+    made = make_study(StudyDefinition.model_validate(values), tmp_path)
+    assert [cell.name for cell in made.cells] == [f"map={name}" for name in names]
+    assert [cell.text for cell in made.cells] == names
+    assert made.definition.baseline == "map=c/one.yaml"
+    assert made.cells[0].published == {"duration_s": 1}
+    # As its folder has it, and as folders had it that named cells by whole paths.
+    again = yaml.safe_load(study_yaml(made)) | {"mission": "museum-1"}
+    for baseline in ("map=c/one.yaml", f"map={tmp_path}/c/one.yaml"):
+        read = make_study(StudyDefinition.model_validate(again | {"baseline": baseline}), Path("/"))
+        assert (read.definition.baseline, read.digest) == ("map=c/one.yaml", made.digest)
+    alone = [{"key": "world.map", "values": ["c/two.yaml"]}]
+    more = {**values, "factors": alone, "baseline": None, "published": []}
+    assert make_study(StudyDefinition.model_validate(more), tmp_path).cells[0].name == "map=two.yaml"

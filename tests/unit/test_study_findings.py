@@ -167,3 +167,38 @@ def test_the_page_tells_effects_with_their_units(shift: float) -> None:
     else:
         assert "tell no effect of any factor from chance" in page
         assert "What these trials cannot tell" in page
+
+
+@pytest.mark.parametrize(("radius", "left"), [(0.8, (0.3, 0.5)), (None, ())])
+def test_levels_that_never_give_a_metric_do_not_silence_the_others(
+    radius: float | None, left: tuple[float, ...]
+) -> None:
+    """One planner that never arrived took the comparison of all others with it, and nothing said so."""
+    rng = np.random.default_rng(6)
+    study = a_study(metrics=["duration_s", "nees_mean"])
+    radii = np.array([cell.values["turning_radius_m"] for cell in study.cells])
+    table = a_table(study, rng, duration_s=10.0 * radii)
+    gone = np.ones(table.row.size, bool) if radius is None else radii[table.cell] == radius
+    table.values[SUCCESS][gone] = 0.0
+    found = [f for f in findings_of(table) if f.metric == "duration_s"]
+    assert {f.factors for f in found if f.is_sure} == ({("turning_radius_m",)} if left else set())
+    page = study_page(table, found=(findings_of(table), ()))
+    if not left:
+        assert not found
+        assert "Nothing of duration. Effects are looked for from" in page
+        return
+    main = next(f for f in found if f.factors == ("turning_radius_m",))
+    assert main.levels == (left,)
+    assert all(f.without == (("turning_radius_m", radius),) for f in found)
+    assert "; without 0.8\u00a0m, where no trial gives it" in page
+    told = study_object(table)["findings"]
+    assert all(f["without"] == [["turning_radius_m", radius]] for f in told if f["metric"] == "duration_s")
+    assert all("without" not in f for f in told if f["metric"] == "nees_mean")
+
+
+def test_a_factor_that_keeps_one_level_is_none() -> None:
+    study = a_study(metrics=["duration_s"])
+    scales = np.array([cell.values["odometry_var_scale"] for cell in study.cells])
+    table = a_table(study, np.random.default_rng(7))
+    table.values[SUCCESS][scales[table.cell] > 1.0] = 0.0
+    assert {f.factors for f in findings_of(table) if f.metric == "duration_s"} == {("turning_radius_m",)}

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pilotage.evaluation.metric import words_and_unit
-from pilotage.experiments.studies.cells import show
+from pilotage.experiments.studies.factors import show
 from pilotage.report.study.scales import Scale, p_value, scale_of, told
 
 

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from pilotage.evaluation.judge import judge, paired_columns
 from pilotage.evaluation.metrics import METRICS
@@ -409,3 +410,13 @@ def test_what_stands_beside_a_value_is_nearer_to_it_than_to_any_other(values: tu
     places = _Places(values)
     for low, high in pairwise(values):
         assert places.of(low, 0.0) < places.of(low, 0.45) < places.of(high, -0.45) < places.of(high, 0.0)
+
+
+@pytest.mark.parametrize("values", [(0.8, 1.5), (1.0, 2.0, 4.0, 12.0), (1.0, 2.0, 64.0), (0.0, 0.1, 50.0)])
+def test_an_axis_has_its_ticks_at_the_values(values: tuple[float, ...]) -> None:
+    """Of 0.8 and 1.5 m/s it had them at 0.6, 0.8, 1.0, ...: lines side by side stood at speeds not driven."""
+    axes = Figure().add_subplot()
+    places = _Places(values)
+    places.prepare(axes)
+    np.testing.assert_allclose(axes.get_xticks(), [places.of(value, 0.0) for value in values])
+    assert [text.get_text() for text in axes.get_xticklabels()] == [f"{value:g}" for value in values]

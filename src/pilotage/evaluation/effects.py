@@ -138,7 +138,9 @@ def effects_of_each(
     rounded = [np.round(values / scale, 12) for values, scale in zip(metrics, scales, strict=True)]
     axes = range(metrics[0].ndim - 1)
     asked = [[_main(values, axis, ordered[axis], paired, tests) for values in rounded] for axis in axes]
-    asked += [_interactions(rounded, pair, paired, tests) for pair in itertools.combinations(axes, 2)]
+    asked += [
+        _interactions(rounded, pair, ordered, paired, tests) for pair in itertools.combinations(axes, 2)
+    ]
     judged = zip(*map(_judged, asked), strict=True)
     return [
         [_scaled(effect, scale) for effect in effects] for effects, scale in zip(judged, scales, strict=True)
@@ -182,15 +184,20 @@ def _main(values: FloatArray, axis: int, ordered: bool, paired: bool, tests: int
     others = tuple(other + 1 for other in range(values.ndim - 1) if other != axis)
     by_level = values.mean(axis=others) if others else values
     means = by_level.mean(axis=0)
-    last = means.size - 1 if ordered else int(np.argmax(np.abs(means - means[0])))
-    ends = (0, last or means.size - 1)
+    ends = _ends(means, ordered)
     terms = means - means.mean()
     size = float((terms**2).sum()) * values.shape[0] * (values[0].size / means.size)
     return _asked((axis,), by_level[:, None, :], means, ends, size, values, paired, tests)
 
 
+def _ends(means: FloatArray, ordered: bool) -> tuple[int, int]:
+    """The first level and the last; where they are in no order the one that differs most from the first."""
+    last = means.size - 1 if ordered else int(np.argmax(np.abs(means - means[0])))
+    return 0, last or means.size - 1
+
+
 def _interactions(
-    metrics: Sequence[FloatArray], pair: tuple[int, int], paired: bool, tests: int
+    metrics: Sequence[FloatArray], pair: tuple[int, int], ordered: Sequence[bool], paired: bool, tests: int
 ) -> list[Effect]:
     others = tuple(other + 1 for other in range(metrics[0].ndim - 1) if other not in pair)
     each = np.stack([values.mean(axis=others) if others else values for values in metrics])
@@ -199,7 +206,7 @@ def _interactions(
     out = []
     for values, both, turned in zip(metrics, each, _second_spreads(each, paired), strict=True):
         held, axes = (both.swapaxes(1, 2), pair[::-1]) if turned else (both, pair)
-        out.append(_interaction(values, held, axes, paired, tests))
+        out.append(_interaction(values, held, axes, ordered[axes[1]], paired, tests))
     return out
 
 
@@ -217,7 +224,7 @@ def _second_spreads(each: FloatArray, paired: bool) -> BoolArray:
 
 
 def _interaction(
-    values: FloatArray, both: FloatArray, axes: tuple[int, int], paired: bool, tests: int
+    values: FloatArray, both: FloatArray, axes: tuple[int, int], ordered: bool, paired: bool, tests: int
 ) -> Effect:
     count = both.shape[1]
     if count == 2:
@@ -227,10 +234,10 @@ def _interaction(
     means = both.mean(axis=0)
     terms = means - means.mean(axis=0) - means.mean(axis=1)[:, None] + means.mean()
     size = float((terms**2).sum()) * values.shape[0] * (values[0].size / means.size)
-    ends = (0, means.shape[1] - 1)
-    found = _asked(axes, np.round(contrasts, 12), means, ends, size, values, paired, tests)
     along = both[:, -1] - both[:, 0]
-    return replace(found, columns=(along[:, 0], along[:, -1]))
+    ends = _ends(along.mean(axis=0), ordered)
+    found = _asked(axes, np.round(contrasts, 12), means, ends, size, values, paired, tests)
+    return replace(found, columns=(along[:, ends[0]], along[:, ends[1]]))
 
 
 def _asked(

@@ -81,6 +81,9 @@ def least_drive_metrics(run: FinishedRun, robot: RobotRun) -> dict[str, object]:
     return {
         "least_length_m": length_m,
         "least_time_s": least_s,
-        "driven_over_least": robot.driven_m / length_m,
-        "time_over_least": run.duration_s / least_s,
+        **(
+            {"driven_over_least": robot.driven_m / length_m, "time_over_least": run.duration_s / least_s}
+            if run.steps
+            else {}
+        ),
     }

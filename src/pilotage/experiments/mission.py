@@ -11,6 +11,7 @@ from typing import Any
 
 from pilotage.core.config import validate
 from pilotage.core.errors import InputError, nearest, unknown_name
+from pilotage.core.file_kinds import check_kind
 from pilotage.core.neighbours import hint_beside
 from pilotage.core.plugins import add_plugins, is_package, named_plugins
 from pilotage.experiments.named_files import anchored
@@ -129,7 +130,9 @@ def read_mission(name_or_path: str, extended_by: tuple[str, ...] = ()) -> dict[s
         if not path.is_file():
             beside = hint_beside(path, {".yaml", ".yml"})
             raise InputError(f"mission file '{name_or_path}': expected a YAML file, found none there{beside}")
-        values = _at_their_places(parse_yaml(read_text(path), str(path)), path.parent)
+        values = parse_yaml(read_text(path), str(path))
+        check_kind(values, "mission", str(path))
+        values = _at_their_places(values, path.parent)
     elif name_or_path in shipped_missions():
         values = parse_shipped((SHIPPED / f"{name_or_path}.yaml").read_text(), name_or_path)
     else:

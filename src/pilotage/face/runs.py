@@ -62,12 +62,12 @@ class Run:
 
     @cached_property
     def trace(self) -> Trace:
-        """What was recorded, columns by name."""
+        """What was recorded, columns by name; ``trace.to_pandas()`` is all of it as a table."""
         return Trace(read_trace(self.folder))
 
     @cached_property
     def events(self) -> tuple[Event, ...]:
-        """What happened, in order: ``t_s``, ``kind``, ``detail``."""
+        """What happened, in order: ``t_s``, ``kind``, ``text``."""
         return tuple(read_events(self.folder))
 
     @cached_property

@@ -120,7 +120,8 @@ def read_carmen(path: Path) -> CarmenLog:
             cut_short = True
     if not scans:
         raise InputError(
-            f"{path} line {len(lines) + 1}: expected FLASER or ROBOTLASER1 lines, found the end of the file"
+            f"{path} line {len(lines) + 1}: expected FLASER or ROBOTLASER1 lines, found the end of the file; "
+            "docs/slam.md shows how to write them from a log of your own"
         )
     beams = np.array([len(scan.ranges_m) for scan in scans], np.int64)
     ranges_m = np.full((beams.size, int(beams.max())), np.nan)

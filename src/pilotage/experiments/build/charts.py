@@ -14,6 +14,7 @@ import numpy as np
 
 from pilotage.core.config import Config, validate
 from pilotage.core.errors import InputError, unknown_name
+from pilotage.core.file_kinds import check_kind
 from pilotage.core.neighbours import hint_beside
 from pilotage.core.types import Pose2
 from pilotage.experiments.values import parse_yaml, read_text
@@ -169,6 +170,7 @@ def _shipped(text: str, name: str, markings: MarkingsConfig) -> WorldMap:
 
 def _of_values(values: dict[str, Any], where: str, markings: MarkingsConfig) -> WorldMap:
     """A map of walls, or a sheet of boxes and tapes."""
+    check_kind(values, "map", where)
     if "size_m" in values and "walls_m" not in values:
         return _sheet(validate(SheetFile, values, where), Path(where).stem, markings)
     return _walls(parse_map(values, where))

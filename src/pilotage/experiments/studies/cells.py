@@ -146,20 +146,10 @@ def _cell(
     values |= {factor.title: value for factor, value in row}
     words = [str(values[CONFIGURATION])] if configuration is not None else []
     words += [
-        str(value) if factor.levels is not None else f"{factor.title}={show(value)}" for factor, value in row
+        str(value) if factor.levels is not None else f"{factor.title}={factor.said(value)}"
+        for factor, value in row
     ]
     return Cell(index, ", ".join(words) or "mission", values, overrides, {})
-
-
-def show(value: Any) -> str:
-    """A value in a cell's name, as a mission file has it: ``null``, ``true``, ``{name: slam}``."""
-    if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{key}: {show(inner)}" for key, inner in value.items()) + "}"
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(map(show, value)) + "]"
-    if value is None or isinstance(value, bool):
-        return {None: "null", True: "true", False: "false"}[value]
-    return f"{value:.12g}" if isinstance(value, float) else f"{value}"
 
 
 def _times(base: Any, factor: float, key: str) -> Any:

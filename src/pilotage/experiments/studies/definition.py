@@ -9,7 +9,7 @@ from typing import Any, Literal
 from pydantic import Field, field_validator, model_validator
 
 from pilotage.core.config import Config
-from pilotage.experiments.studies.factors import Factor, check_plain, first_twice
+from pilotage.experiments.studies.factors import Factor, check_plain, first_twice, show, told_apart
 
 NAME = re.compile(r"[^\W_][\w.-]*")
 LONGEST_NAME = 200
@@ -140,6 +140,11 @@ class StudyDefinition(Config):
                 raise ValueError(f"{key}: expected at most {MANY}, found {len(value)}")
         return values
 
+    @field_validator("factors")
+    @classmethod
+    def _told_apart(cls, factors: tuple[Factor, ...]) -> tuple[Factor, ...]:
+        return told_apart(factors)
+
     @model_validator(mode="after")
     def _sound(self) -> StudyDefinition:
         for where, values in (("set", self.set), *((c.name, c.set) for c in self.configurations)):
@@ -180,6 +185,11 @@ class StudyDefinition(Config):
             for level in (factor.levels or {}).values():
                 keys += level
         return keys
+
+    def said(self, factor: str, value: Any) -> str:
+        """A value of a factor as names of cells have it."""
+        known = next((entry for entry in self.factors if entry.title == factor), None)
+        return show(value) if known is None else known.said(value)
 
     @property
     def factor_names(self) -> tuple[str, ...]:

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+import os
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from decimal import Decimal
+from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -100,7 +103,8 @@ class Factor(Config):
     key
         The mission's key, or several that take the same value together.
     name
-        What it is called in tables; by default the last part of the key.
+        What it is called in tables; by default the last part of the key (of ``stack.localizer.name`` the
+        role), as many parts as tell it from the study's other factors.
     values, range, log_range, random_range, levels
         One of them. ``levels`` are named sets of overrides, for what one key cannot say.
     multiply
@@ -157,7 +161,22 @@ class Factor(Config):
     @property
     def title(self) -> str:
         """What the factor is called."""
-        return self.name or self.keys[0].rsplit(".", 1)[-1]
+        return self.name or self.tail(1)
+
+    def tail(self, parts: int) -> str:
+        """The last parts of the key; a component that is named goes by its role: ``localizer``."""
+        return "_".join(self.keys[0].removesuffix(".name").split(".")[-parts:])
+
+    @property
+    def names(self) -> dict[str, str]:
+        """Of the files among the values, by their absolute paths, the ends of these that tell them apart."""
+        paths = [text for text in _texts(self.settings()) if Path(text).is_absolute()]
+        common = os.path.commonpath([Path(path).parent for path in paths]) if paths else ""
+        return {path: str(Path(path).relative_to(common)) for path in paths}
+
+    def said(self, value: Any) -> str:
+        """A value as a cell's name has it, a file by its name there."""
+        return show(value, self.names)
 
     def settings(self) -> tuple[Any, ...]:
         """The values, or the levels' names."""
@@ -168,6 +187,50 @@ class Factor(Config):
         source = self.range or self.log_range or self.random_range
         assert source is not None
         return source.values()
+
+
+def told_apart(factors: Sequence[Factor]) -> tuple[Factor, ...]:
+    """The same factors, each with as many parts of its key as name as tell it from all others."""
+    return tuple(
+        factor.model_copy(update={"name": factor.tail(parts)}) if parts > 1 else factor
+        for factor in factors
+        for parts in [_parts(factor, [one for one in factors if one is not factor])]
+    )
+
+
+def _parts(factor: Factor, others: Sequence[Factor]) -> int:
+    """How many parts of its key tell a factor from others; 1 where it has a name, or where none do."""
+    most = 0 if factor.name else factor.keys[0].count(".") + 1
+    apart = (
+        parts
+        for parts in range(1, most + 1)
+        if all((one.name or one.tail(parts)) != factor.tail(parts) for one in others)
+    )
+    return next(apart, 1)
+
+
+def show(value: Any, names: Mapping[str, str] = MappingProxyType({})) -> str:
+    """A value in a cell's name, as a mission file has it: ``null``, ``true``, ``{name: slam}``.
+
+    Texts that have a name in ``names`` are called by it.
+    """
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{key}: {show(inner, names)}" for key, inner in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(show(inner, names) for inner in value) + "]"
+    if value is None or isinstance(value, bool):
+        return {None: "null", True: "true", False: "false"}[value]
+    return f"{value:.12g}" if isinstance(value, float) else names.get(str(value), str(value))
+
+
+def _texts(value: Any) -> Iterator[str]:
+    if isinstance(value, Mapping):
+        value = tuple(value.values())
+    if isinstance(value, list | tuple):
+        for inner in value:
+            yield from _texts(inner)
+    elif isinstance(value, str):
+        yield value
 
 
 def first_twice(texts: Iterable[str]) -> str | None:

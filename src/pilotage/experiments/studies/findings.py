@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -9,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from pilotage.core.types import FloatArray, IntArray
+from pilotage.core.types import BoolArray, FloatArray, IntArray
 from pilotage.evaluation.effects import SURE, Effect, effects_of_each, holm
 from pilotage.evaluation.intervals import Summary
 from pilotage.evaluation.judge import SUCCESS, Judgement
@@ -38,7 +39,9 @@ class Finding:
     factors
         One for a main effect, two for an interaction.
     levels
-        By factor, its levels.
+        By factor, the levels that were compared.
+    without
+        Factors with a level that was left out, for no trial at it gives the metric.
     p_corrected
         Corrected for all findings of the study (Holm): at most one study in twenty without any effect has one
         below 0.05.
@@ -50,6 +53,7 @@ class Finding:
     levels: tuple[tuple[Any, ...], ...]
     effect: Effect
     p_corrected: float
+    without: tuple[tuple[str, Any], ...] = ()
 
     @property
     def is_sure(self) -> bool:
@@ -82,9 +86,32 @@ class _Design:
     levels: tuple[tuple[Any, ...], ...]
     cells: IntArray
 
+    without: tuple[tuple[str, Any], ...] = ()
+    """Factors with a level that was left out."""
+
     @property
     def ordered(self) -> list[bool]:
         return [all(_is_number(level) for level in levels) for levels in self.levels]
+
+    def given(self, there: BoolArray) -> _Design:
+        """The same without levels of which no cell is there; what keeps one level is no factor."""
+        found, axes = there[self.cells], range(self.cells.ndim)
+        kept = [np.any(np.moveaxis(found, axis, 0).reshape(found.shape[axis], -1), axis=1) for axis in axes]
+        varied = [axis for axis in axes if kept[axis].sum() > 1]
+        alone = tuple(axis for axis in axes if axis not in varied)
+        gone = [
+            (factor, level)
+            for factor, levels, keep in zip(self.factors, self.levels, kept, strict=True)
+            for level, has in zip(levels, keep, strict=True)
+            if not has
+        ]
+        return _Design(
+            self.group,
+            tuple(self.factors[axis] for axis in varied),
+            tuple(tuple(itertools.compress(self.levels[axis], kept[axis])) for axis in varied),
+            self.cells[np.ix_(*kept)].squeeze(alone),
+            tuple(gone),
+        )
 
 
 def findings_of(table: StudyTable) -> list[Finding]:
@@ -97,12 +124,12 @@ def findings_of(table: StudyTable) -> list[Finding]:
     others = [metric for metric in dict.fromkeys([*table.telling, SUCCESS]) if metric != table.primary]
     out: list[Finding] = []
     for family in ([table.primary], others):
-        by_design = [(design, _effects(table, family, design)) for design in designs]
+        by_design = [_effects(table, family, design) for design in designs]
         found = [
-            (metric, design, effect)
+            (metric, given, effect)
             for metric in family
-            for design, each in by_design
-            for effect in each[metric]
+            for each in by_design
+            for given, effect in each.get(metric, ())
         ]
         # What never varies is no test and takes nothing from the others.
         tests = PARTS * sum(math.isfinite(effect.p_value) for _, _, effect in found)
@@ -116,23 +143,32 @@ def findings_of(table: StudyTable) -> list[Finding]:
                 tuple(design.levels[axis] for axis in effect.axes),
                 effect,
                 p,
+                design.without,
             )
             for (metric, design, effect), p in zip(found, p_values, strict=True)
         ]
     return out
 
 
-def _effects(table: StudyTable, metrics: Sequence[str], design: _Design) -> dict[str, list[Effect]]:
-    """The effects on each metric over the trials that give it at every setting of a design."""
-    alike: dict[int, dict[str, FloatArray]] = {}
+def _effects(
+    table: StudyTable, metrics: Sequence[str], design: _Design
+) -> dict[str, list[tuple[_Design, Effect]]]:
+    """The effects on each metric over the trials that give it at every setting that gives it at all."""
+    alike: dict[tuple[object, ...], tuple[_Design, dict[str, FloatArray]]] = {}
     for metric in metrics:
-        trials = by_trial(table, metric)[:, design.cells]
+        values = by_trial(table, metric)
+        there: BoolArray = np.any(np.isfinite(values), axis=0)
+        if not there[design.cells].any():
+            continue
+        given = design.given(there)
+        trials = values[:, given.cells]
         complete = trials[np.isfinite(trials).reshape(trials.shape[0], -1).all(axis=1)]
-        alike.setdefault(len(complete), {})[metric] = complete
-    out: dict[str, list[Effect]] = {}
-    for values in alike.values():
-        found = effects_of_each([*values.values()], ordered=design.ordered, paired=table.same_seeds)
-        out |= dict(zip(values, found, strict=True))
+        alike.setdefault((given.without, len(complete)), (given, {}))[1][metric] = complete
+    out: dict[str, list[tuple[_Design, Effect]]] = {}
+    for given, each in alike.values():
+        found = effects_of_each([*each.values()], ordered=given.ordered, paired=table.same_seeds)
+        for metric, effects in zip(each, found, strict=True):
+            out[metric] = [(given, effect) for effect in effects]
     return out
 
 
@@ -247,6 +283,7 @@ def _plain(finding: Finding) -> dict[str, Any]:
         "unit": METRICS.find(finding.metric).unit,
         **({"group": finding.group} if finding.group else {}),
         "factors": list(finding.factors),
+        **({"without": [list(pair) for pair in finding.without]} if finding.without else {}),
         "levels": [list(levels) for levels in finding.levels],
         "means": effect.means.tolist(),
         "trials": effect.n,

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from pilotage.evaluation.metric import words_and_unit
-from pilotage.experiments.studies.cells import Cell, show
+from pilotage.experiments.studies.cells import Cell
 from pilotage.experiments.studies.definition import CONFIGURATION, StudyDefinition
 from pilotage.experiments.studies.groups import CellGroup
 
@@ -34,7 +34,8 @@ def labelled(
             unit = unit_of(definition, title)
             after = f"\u00a0{unit}" if unit else ""
             named = factors[title].levels is not None or isinstance(value, str)
-            words.append(str(value) if named else f"{words_and_unit(title)[0]} {show(value)}{after}")
+            said = definition.said(title, value)
+            words.append(said if named else f"{words_and_unit(title)[0]} {said}{after}")
         out.append(", ".join(words) or cell.name)
     for group in groups:
         parts = [out[index].split(", ") for index in group.cells]

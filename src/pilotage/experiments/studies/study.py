@@ -16,6 +16,7 @@ import yaml
 
 from pilotage.core.config import validate
 from pilotage.core.errors import InputError, unknown_name
+from pilotage.core.file_kinds import check_kind
 from pilotage.core.files import decoded, read_bytes
 from pilotage.core.plugins import PluginError, is_package
 from pilotage.experiments.mission import mission_of, read_mission, shipped_missions
@@ -144,6 +145,7 @@ def load_study(
         values = parse_yaml((SHIPPED / f"{name_or_path}.yaml").read_text(encoding="utf-8"), name_or_path)
     else:
         raise unknown_name("study", name_or_path, shipped_studies())
+    check_kind(values, "study", name_or_path)
     try:
         of_a_mission = Mission.model_fields.keys() - StudyDefinition.model_fields.keys()
         for key in sorted(of_a_mission & values.keys()):
@@ -217,8 +219,11 @@ def _at_their_places(definition: StudyDefinition, places: Sequence[Path]) -> Stu
     values = definition.model_dump(mode="json")
     varied = {key: anchored(values[key], places) for key in ("set", "configurations", "factors")}
     moved = dict(_moved(values["factors"], varied["factors"]))
-    # Cells are named by their values: what names cells is told alike.
-    told = {key: _told(values[key], moved) for key in ("baseline", "groups", "published")}
+    made = validate(StudyDefinition, {**values, **varied}, "")
+    # Cells are named by their values, of files by the ends of their paths: what names cells is told alike.
+    names = {path: name for factor in made.factors for path, name in factor.names.items()}
+    names |= {before: names[after] for before, after in moved.items()}
+    told = {key: _told(values[key], moved, names) for key in ("baseline", "groups", "published")}
     return validate(StudyDefinition, {**values, **varied, **told}, "")
 
 
@@ -234,18 +239,18 @@ def _moved(before: Any, after: Any) -> Iterator[tuple[str, str]]:
         yield before, after
 
 
-def _told(value: Any, moved: Mapping[str, str]) -> Any:
-    """What names cells, ``map=a.yaml, gate=0.9``, or their values, with those values as they are now."""
+def _told(value: Any, moved: Mapping[str, str], names: Mapping[str, str]) -> Any:
+    """Values of cells as they are now; what names cells, ``map=a.yaml, gate=0.9``, with the files' names."""
     if isinstance(value, Mapping):
-        return {_told(key, moved): _told(inner, moved) for key, inner in value.items()}
+        return {_told(key, moved, names): _told(inner, moved, names) for key, inner in value.items()}
     if isinstance(value, list):
-        return [_told(inner, moved) for inner in value]
+        return [_told(inner, moved, names) for inner in value]
     if not isinstance(value, str):
         return value
-    for before, after in moved.items():
-        if value == before:
-            return after
-        value = re.sub(f"(?<==){re.escape(before)}(?=, |$)", after.replace("\\", r"\\"), value)
+    if value in moved:
+        return moved[value]
+    for file, name in names.items():
+        value = re.sub(f"(?<==){re.escape(file)}(?=, |$)", name.replace("\\", r"\\"), value)
     return value
 
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
 from matplotlib.figure import Figure
 
 from pilotage.core.whole_file import write_whole
@@ -47,6 +48,12 @@ PEOPLE_HEAD = (
     "time lost",
     "runs",
 )
+HOW = (
+    "Success with its 95 % Wilson interval over the runs. Over bound: time over the least that any robot of "
+    "the same limits needs though it knows the course, with its 95 % interval over the courses; 1 is out of "
+    "reach, less is better."
+)
+MOST_TOLD = 4
 WORST = 8
 BOTTLENECK = "bottleneck-"
 COMPARED: tuple[tuple[str, int, Callable[[CourseRun], float]], ...] = (
@@ -74,8 +81,14 @@ def write_controllers_report(folder: Path, shown: ControllersPage) -> Path:
 def controllers_page(shown: ControllersPage) -> str:
     """Return the page as HTML."""
     families = list(dict.fromkeys(run.family for runs in shown.runs.values() for run in runs))
-    best = max(shown.runs, key=lambda name: summarize_courses(shown.runs[name]).success)
-    found = summarize_courses(shown.runs[best])
+    summaries = {name: summarize_courses(runs) for name, runs in shown.runs.items()}
+    # Where nobody arrives there is no time, and nan has no order.
+    ranked = sorted(
+        summaries,
+        key=lambda name: (-summaries[name].success, np.nan_to_num(summaries[name].over_bound, nan=np.inf)),
+    )
+    best = ranked[0]
+    found = summaries[best]
     figures = []
     if any(family.startswith(BOTTLENECK) for family in families):
         with drawing_style():
@@ -83,7 +96,7 @@ def controllers_page(shown: ControllersPage) -> str:
     all_rows = [_row(name, runs) for name, runs in shown.runs.items()]
     return page(
         [
-            section("all", "All courses", plain_table(HEAD, all_rows)),
+            section("all", "All courses", f"<p>{HOW}</p>", plain_table(HEAD, all_rows)),
             *(_family(shown, position, family) for position, family in enumerate(families)),
             *figure_sections(figures),
             pairs_section(shown.runs, lambda run: (run.family, run.course), COMPARED),
@@ -93,9 +106,9 @@ def controllers_page(shown: ControllersPage) -> str:
         title="Controllers",
         eyebrow="pilotage bench controllers",
         heading="Local controllers on courses of many kinds",
-        headline=f"{best}: {percent(found.success)} of {counted(found.trials, 'run')} on "
-        f"{counted(found.courses, 'course')} arrive.",
+        headline="; ".join(_told(name, summaries[name]) for name in ranked[:MOST_TOLD]) + ".",
         tiles=[
+            *([("best controller", best)] if len(ranked) > 1 else []),
             ("success", percent(found.success)),
             ("collisions", percent(found.collision)),
             ("time over bound", number(found.over_bound, 3)),
@@ -103,6 +116,13 @@ def controllers_page(shown: ControllersPage) -> str:
         ],
         footer="Made by pilotage.",
     )
+
+
+def _told(name: str, found: CourseSummary) -> str:
+    """How often a controller arrived, and how fast."""
+    runs = f"{counted(found.trials, 'run')} on {counted(found.courses, 'course')}"
+    fast = f" at {number(found.over_bound, 3)} times the bound" if math.isfinite(found.over_bound) else ""
+    return f"{name}: {percent(found.success)} of {runs} arrive{fast}"
 
 
 def _family(shown: ControllersPage, position: int, family: str) -> Section:

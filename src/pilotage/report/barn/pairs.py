@@ -47,7 +47,7 @@ def pairs_section(
             rows.append(
                 [
                     f"{what}: {name} minus {first}",
-                    f"{found.mean:+.{digits}f}".replace("-", "−") if math.isfinite(found.mean) else "–",
+                    number(found.mean, digits, "+"),
                     interval(found.low, found.high, digits, "+"),
                     f"{found.p_value:.2g}" if math.isfinite(found.p_value) else "–",
                     str(found.n),
@@ -90,15 +90,15 @@ def percent(share: float) -> str:
     return f"{100.0 * share:.1f}\u00a0%"
 
 
-def number(value: float, digits: int) -> str:
-    """So many digits after the point; a dash for none."""
-    return f"{value:.{digits}f}" if math.isfinite(value) else "–"
+def number(value: float, digits: int, sign: str = "") -> str:
+    """So many digits after the point; a dash for none; ``sign="+"`` writes that as well."""
+    return f"{value:{sign}.{digits}f}".replace("-", "−") if math.isfinite(value) else "–"
 
 
 def interval(low: float, high: float, digits: int, sign: str = "") -> str:
-    """From where to where; a dash for none, as of a single course; ``sign="+"`` writes that as well."""
+    """From where to where; a dash for none, as of a single course."""
     known = math.isfinite(low) and math.isfinite(high)
-    return f"{low:{sign}.{digits}f} to {high:{sign}.{digits}f}" if known else "–"
+    return f"{number(low, digits, sign)} to {number(high, digits, sign)}" if known else "–"
 
 
 def seconds(value: float, digits: int) -> str:

@@ -36,7 +36,7 @@ def view_limits(run: RunData) -> Limits | None:
     world = run.world
     ends = [pose[:2] for robot in world.robots for pose in (robot.start, *robot.goals) if pose is not None]
     visited = [
-        layers.true_path(run),
+        _driven(run),
         *(plan.path[:, :2] for plan in run.plans),
         np.array(ends).reshape(-1, 2),
     ]
@@ -53,12 +53,20 @@ def view_limits(run: RunData) -> Limits | None:
     return x - 0.5 * side, y - 0.5 * side, x + 0.5 * side, y + 0.5 * side
 
 
+def _driven(run: RunData) -> FloatArray:
+    """(n, 2) where the robot was; of a recording without a truth where it held itself for localized."""
+    path = layers.true_path(run)
+    if not np.isfinite(path).all(axis=1).any():
+        path = layers.estimated_path(run)[run.trace["localized"] != 0.0]
+    return path
+
+
 def _world_points(run: RunData) -> FloatArray:
     """(n, 2) points that span the world and everything that truly happened in it."""
     world = run.world
     if run.grid is not None:
         # A grid's rim is often unknown for many metres.
-        visited = [layers.true_path(run), *(plan.path[:, :2] for plan in run.plans)]
+        visited = [_driven(run), *(plan.path[:, :2] for plan in run.plans)]
         ends = [robot.start[:2] for robot in world.robots if robot.start is not None]
         return np.concatenate([known_corners(run.grid), *visited, np.array(ends).reshape(-1, 2)])
     discs = [discs for discs in (world.circles_m, world.obstacle_circles_m) if len(discs)]
@@ -72,7 +80,7 @@ def _world_points(run: RunData) -> FloatArray:
     if world.bounds_m is not None:
         parts.append(np.array(world.bounds_m).reshape(2, 2))
     if sum(len(part) for part in parts):
-        parts += [layers.true_path(run), *(plan.path[:, :2] for plan in run.plans)]
+        parts += [_driven(run), *(plan.path[:, :2] for plan in run.plans)]
     return np.concatenate(parts)
 
 

@@ -28,10 +28,12 @@ def scene_events(run: RunData) -> tuple[SceneEvent, ...]:
 
 
 def position_error(column: Column) -> Series:
-    """The position's error, and the long half axis of its 95 % ellipse."""
+    """The position's error, and the long half axis of its 95 % ellipse; without a truth that alone."""
     error = np.hypot(column("est_x_m") - column("true_x_m"), column("est_y_m") - column("true_y_m"))
     xx, xy, yy = column("cov_xx_m2"), column("cov_xy_m2"), column("cov_yy_m2")
     # Larger eigenvalue of the position's covariance: the long half axis of the ellipse on the map.
     largest = 0.5 * (xx + yy) + np.sqrt(0.25 * (xx - yy) ** 2 + xy**2)
     half_axis = np.sqrt(np.maximum(largest, 0.0) * chi_square_quantile(0.95, 2))
+    if not np.isfinite(error).any():
+        return Series("95 % half axis of position", "m", half_axis, BLUE)
     return Series("position error", "m", error, BLUE, band=half_axis, band_name="95 % half axis")

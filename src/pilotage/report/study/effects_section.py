@@ -10,7 +10,6 @@ from typing import Any
 from pilotage.evaluation.effects import FEWEST
 from pilotage.evaluation.metric import words_and_unit
 from pilotage.evaluation.metrics import METRICS
-from pilotage.experiments.studies.cells import show
 from pilotage.experiments.studies.findings import SETTING, Best, Finding
 from pilotage.experiments.studies.table import StudyTable
 from pilotage.report import markup
@@ -47,7 +46,9 @@ def effects_section(table: StudyTable, findings: Sequence[Finding], best: Sequen
         lines.append("These trials tell no effect of any factor from chance.")
     lines += [_best(table, entry) for entry in best if _is_about(entry.metric, table, sure)]
     together = groupby(_unsure(findings), key=lambda f: (f.group, f.metric))
-    open_ = [text for _, entries in together if (text := _open(list(entries)))]
+    open_ = [text for _, entries in together if (text := _open(table, list(entries)))]
+    if table.primary not in {finding.metric for finding in findings}:
+        open_.insert(0, f"Nothing of {METRICS.find(table.primary).name}. {TOO_FEW}")
     rest = f"<h3>What these trials cannot tell</h3>{_list(open_[:MOST_LINES])}" if open_ else ""
     how = HOW.format(tests=PAIRED if table.same_seeds else APART)
     made = f"<details><summary>All effects</summary><p>{how}</p>{_tables(table, findings)}</details>"
@@ -77,7 +78,7 @@ def level_words(table: StudyTable, factor: str, level: Any) -> str:
     if factor == SETTING:
         return next((cell.text for cell in table.cells if cell.name == level), str(level))
     unit = table.unit(factor)
-    text = show(level)
+    text = table.study.definition.said(factor, level)
     return f"{text}\u00a0{unit}" if unit and isinstance(level, int | float) else text
 
 
@@ -100,18 +101,25 @@ def _shown(table: StudyTable, finding: Finding) -> str:
     first, last = _ends(table, finding)
     evidence = f"{100.0 * effect.share:.0f}\u00a0% of the variance, {p_value(finding.p_corrected, 'p ')}"
     factors = [factor_words(factor) for factor in finding.factors]
+    without = _without(table, finding)
     if len(factors) == 2:
         one, other = factors
         ends = [level_words(table, finding.factors[0], finding.levels[0][end]) for end in (0, -1)]
         return (
             f"{_metric(finding)}: {one} and {other} act together: the change from {ends[0]} to {ends[1]} of "
-            f"{one} differs by {by} between {first} and {last} of {other} ({evidence})."
+            f"{one} differs by {by} between {first} and {last} of {other} ({evidence}){without}."
         )
     start, end = (told(finding.metric, float(effect.means[i]), math.nan, math.nan) for i in effect.ends)
     return (
         f"{_metric(finding)} depends on {factors[0]}: {start} at {first}, {end} at {last}, "
-        f"a change by {by} ({evidence}){_inner(table, finding)}."
+        f"a change by {by} ({evidence}){_inner(table, finding)}{without}."
     )
+
+
+def _without(table: StudyTable, finding: Finding) -> str:
+    """Which levels were left out, because no trial at them gives the metric."""
+    names = [level_words(table, factor, level) for factor, level in finding.without]
+    return f"; without {', '.join(names)}, where no trial gives it" if names else ""
 
 
 def _inner(table: StudyTable, finding: Finding) -> str:
@@ -144,7 +152,7 @@ def _best(table: StudyTable, best: Best) -> str:
     return f"{text}; not told from it by these trials: {also}."
 
 
-def _open(findings: Sequence[Finding]) -> str:
+def _open(table: StudyTable, findings: Sequence[Finding]) -> str:
     """Which effects on one metric were not told, and how large they would have had to be."""
     parts = []
     for finding in findings:
@@ -159,8 +167,8 @@ def _open(findings: Sequence[Finding]) -> str:
         parts.append(f"{factors} (a change of {size} would have shown{more})")
     if not parts:
         return ""
-    n = findings[0].effect.n
-    return f"{_metric(findings[0])}, {count(n)} trials a setting: nothing told of {', '.join(parts)}."
+    about = f"{_metric(findings[0])}, {count(findings[0].effect.n)} trials a setting"
+    return f"{about}: nothing told of {', '.join(parts)}{_without(table, findings[0])}."
 
 
 def _tables(table: StudyTable, findings: Sequence[Finding]) -> str:

@@ -15,7 +15,7 @@ from pilotage.core.types import FloatArray
 from pilotage.evaluation.intervals import Summary
 from pilotage.evaluation.judge import Judgement
 from pilotage.evaluation.metric import words_and_unit
-from pilotage.experiments.studies.cells import Cell, show
+from pilotage.experiments.studies.cells import Cell
 from pilotage.experiments.studies.groups import CellGroup
 from pilotage.experiments.studies.table import StudyTable
 from pilotage.report.light_axes import LightAxes
@@ -96,10 +96,9 @@ def _kept_apart(value: object) -> float | str:
 
 def _said(table: StudyTable, factor: str, value: object) -> str:
     """A factor's value with its name and its unit; a level or a configuration by its own name."""
-    if isinstance(value, str):
-        return value
     if not _is_number(value):
-        return f"{words_and_unit(factor)[0]} {show(value)}"
+        said = table.study.definition.said(factor, value)
+        return said if isinstance(value, str) else f"{words_and_unit(factor)[0]} {said}"
     unit = table.unit(factor)
     return f"{words_and_unit(factor)[0]} {value:g}{f' {unit}' if unit else ''}"
 
@@ -137,8 +136,10 @@ def _factor_figure(
     slug = f"factor-{'' if alone else f'{number}-'}{''.join(c if c.isalnum() else '-' for c in factor)}"
     short = words_and_unit(factor)[0]
     alt = f"The study's metrics over {short}: means with 95 % intervals."
+    beside = ", side by side about it" if len(lines) > 1 else ""
     caption = (
-        f"Means over the trials at each {short}, with 95 % bootstrap intervals; small dots are single trials."
+        f"Means over the trials at each {short}{beside}, with 95 % bootstrap intervals; small dots are "
+        "single trials."
     )
     name = f"Over {short}" if alone else f"Over {short}: {group.name}"
     return Illustration(slug, name, alt, caption, render(figure, slug, alt), tuple(keys))
@@ -201,6 +202,10 @@ class _Places:
         gap = min(float(step) for step in np.diff(self._values))
         self._log = len(self._values) > 2 and first > 0.0 and last / first >= 30.0
         self._even = not self._log and gap < CROWDED * (last - first)
+        # Ticks elsewhere would tell what stands aside of its value to be another value's.
+        self._has_room = (
+            len(self._values) <= MOST_TICKS if self._log else gap * MOST_TICKS >= 0.999 * (last - first)
+        )
         # The least step: aside of its value nothing stands nearer to another one.
         places = np.log10(self._values) if self._log else np.array(self._values)
         self._step = 1.0 if self._even else float(np.diff(places).min())
@@ -210,7 +215,7 @@ class _Places:
         if self._log:
             set_log(axes, "x")
         axes.set_xlim(self.of(self._values[0], -0.4), self.of(self._values[-1], 0.4))
-        if self._even or (self._log and len(self._values) <= MOST_TICKS):
+        if self._even or self._has_room:
             at = [self.of(value, 0.0) for value in self._values]
             axes.set_xticks(at, [f"{value:g}" for value in self._values])
             axes.xaxis.set_minor_locator(NullLocator())

@@ -93,7 +93,7 @@ def _findings(table: StudyTable, judgement: Judgement) -> Section:
     ]
     text = table.study.definition.description if table.study.definition.question else ""
     note = f'<p class="note">{escape(text)}</p>' if text else ""
-    return section("findings", "What it says", *parts, note)
+    return section("findings", "What else it says", *parts, note)
 
 
 def _tiles(table: StudyTable) -> list[tuple[str, str]]:
