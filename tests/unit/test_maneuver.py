@@ -3,18 +3,26 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
 
 from pilotage.core.errors import InputError
+from pilotage.core.types import STOP, Pose2, Twist
 from pilotage.experiments.build.build import build
 from pilotage.experiments.loop import run_loop
 from pilotage.experiments.mission import load_mission, mission_of, read_mission
 from pilotage.experiments.run import run_mission
-from pilotage.stack.navigator.maneuver import ManeuverConfig, ManeuverNavigator
+from pilotage.sensors.readings import Readings
+from pilotage.stack.interface import Belief, BeliefStatus
+from pilotage.stack.journal import Journal
+from pilotage.stack.navigator.maneuver import ManeuverConfig, ManeuverNavigator, states
+from pilotage.stack.navigator.maneuver.context import Context
 from pilotage.stack.navigator.maneuver.stops import MOST_STOPS, Stops
 from pilotage.stack.navigator.navigator import Parts
+from pilotage.stack.navigator.state import Ended
 from support.robots import told_of
 
 
@@ -95,6 +103,36 @@ def test_who_is_stopped_again_and_again_gives_up_only_where_it_gets_no_farther()
     assert not stops.too_many
     stops.again(10.0)
     assert stops.too_many
+
+
+def test_who_may_neither_go_on_nor_back_steps_clear_and_plans_from_there(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Before a wall a turn to either side was refused, twelve times, and a sweep given up at a fifth."""
+    ahead, planned = Twist(0.15, 0.0), Ended()
+    belief = Belief(Pose2(0.0, 0.0, 0.0), np.zeros((3, 3)), BeliefStatus.LOCALIZED)
+    room = {"found": ahead, "leaves": True}
+    context = cast(
+        Context,
+        SimpleNamespace(
+            stops=Stops(),
+            journal=Journal(),
+            step_clear=SimpleNamespace(found=lambda _: room["found"]),
+            yielding=SimpleNamespace(forget=lambda: None),
+            look=lambda *_: None,
+            may_leave=lambda *_: room["leaves"],
+        ),
+    )
+    monkeypatch.setattr(states, "plan", lambda *_: planned)
+    state = states.stop_short(context, states.BackingOut(context), 1.0, belief, 5.0)
+    for t_s in (1.1, 1.5, 1.9):
+        state, command = state.step(Readings(t_s, {}), belief)
+        assert command == ahead
+    assert state.step(Readings(2.1, {}), belief) == (planned, STOP)
+    room["leaves"] = False
+    assert state.step(Readings(1.9, {}), belief) == (planned, STOP)
+    room["found"] = None
+    assert states.stop_short(context, states.BackingOut(context), 1.0, belief, 5.0) is planned
 
 
 @pytest.mark.parametrize("seed", [8, 11, 12])

@@ -39,7 +39,11 @@ class StepClear:
     def __init__(self, robot: RobotKnowledge, last_word: LastWord) -> None:
         self._last_word, self._footprint = last_word, robot.footprint
         speed = min(SPEED_M_S, robot.motion.top_speed_m_s)
-        turn = min(TURN_RAD_S, robot.motion.top_turn_rate_rad_s)
+        turn, radius_m = (
+            min(TURN_RAD_S, robot.motion.top_turn_rate_rad_s),
+            robot.motion.least_turning_radius_m,
+        )
+        turn = turn if radius_m == 0.0 else min(turn, speed / radius_m)
         sees_behind = any(looks_back(sheet) for sheet in robot.sensors_of(LidarConfig).values())
         speeds = (speed, -speed) if sees_behind else (speed,)
         self._steps = [Twist(v, share * turn) for v in speeds for share in (0.0, 0.5, -0.5, 1.0, -1.0)]
@@ -57,6 +61,14 @@ class StepClear:
             return command
         if self._last_word.held_s < PATIENCE_S:
             return STOP
+        step = self.found(may)
+        if step is None:
+            return STOP
+        self._step, self._until_s = step, t_s + STEP_S
+        return step
+
+    def found(self, may: Callable[[Twist], bool] = _anything) -> Twist | None:
+        """The step for ``STEP_S`` that leads clear of what was refused last; None where none does."""
         shown_m = self._last_word.shown_m
         now_m = self._away_m(STOP, shown_m)
         gains = [(self._away_m(step, shown_m) - now_m, step) for step in self._steps]
@@ -64,9 +76,8 @@ class StepClear:
             if gain < GAINS_M:
                 break
             if self._may(step, may):
-                self._step, self._until_s = step, t_s + STEP_S
                 return step
-        return STOP
+        return None
 
     def _may(self, step: Twist, may: Callable[[Twist], bool]) -> bool:
         return may(step) and self._last_word.allows(step)

@@ -10,6 +10,7 @@ from pilotage.sensors.readings import Readings
 from pilotage.stack.control.give_way import GiveWay
 from pilotage.stack.control.last_word import LastWord
 from pilotage.stack.control.own_half import OwnHalf
+from pilotage.stack.control.step_clear import StepClear
 from pilotage.stack.interface import Belief, StackStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
@@ -85,6 +86,7 @@ class Context:
         rng = robot.streams.stream("planner")
         self.plan = GlobalPlan(planner, parts.smoother, chart, rng, journal, robot=robot, as_planned=True)
         self.last_word = LastWord(robot)
+        self.step_clear = StepClear(robot, self.last_word)
         self.wandering = Wandering(config.wander, robot, localizer_of(parts, "maneuver"), self.last_word)
         self.status, self.reason = StackStatus.RUNNING, ""
         self.trail: Trail | None = None
@@ -170,6 +172,10 @@ class Context:
     def may_drive(self, command: Twist, pose: Pose2) -> bool:
         """Whether nobody walks where the command leads."""
         return self._gives_way.allows(command, pose, self.own_map.mapped_circles_m)
+
+    def may_leave(self, command: Twist, pose: Pose2) -> bool:
+        """Whether moreover the lasers show room for it."""
+        return self.may_drive(command, pose) and self.last_word.allows(command)
 
     def look(self, readings: Readings, belief: Belief) -> None:
         """Take in what the sensors show of what is on no map."""

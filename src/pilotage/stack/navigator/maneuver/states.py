@@ -6,8 +6,9 @@ import math
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
-from pilotage.core.types import STOP
+from pilotage.core.types import STOP, Twist
 from pilotage.sensors.readings import Readings
+from pilotage.stack.control.step_clear import STEP_S
 from pilotage.stack.interface import Belief, BeliefStatus, StackStatus
 from pilotage.stack.navigator.maneuver.context import Context
 from pilotage.stack.navigator.state import Ended, Move, State
@@ -95,6 +96,23 @@ class BackingOut:
         return drive(self.context, self, readings, belief)
 
 
+@dataclass(frozen=True, slots=True)
+class SteppingClear:
+    """Moves away from what its lasers show, where it may neither go on nor back the way it came."""
+
+    context: Context
+    command: Twist
+    until_s: float
+
+    def step(self, readings: Readings, belief: Belief) -> Move:
+        """On while there is room, then plan from there."""
+        context, t_s = self.context, readings.t_s
+        context.look(readings, belief)
+        if t_s < self.until_s and context.may_leave(self.command, belief.pose):
+            return Move(self, self.command)
+        return Move(plan(context, t_s, belief), STOP)
+
+
 Driving: TypeAlias = Following | BackingOut
 
 
@@ -169,20 +187,27 @@ def drive(context: Context, state: Driving, readings: Readings, belief: Belief) 
 def stop_short(context: Context, state: Driving, t_s: float, belief: Belief, to_go_m: float) -> State:
     """A laser shows a wall where the plan leads, which is on its own map now: plan anew.
 
-    From some way back, where it can: beside what it almost touches there is no room for a plan. It gives up
-    where it gets no farther along its plans.
+    From some way back, where it can: beside what it almost touches there is no room for a plan. Where it may
+    not back either it steps clear. It gives up where it gets no farther along its plans.
     """
     backs = isinstance(state, BackingOut)
     context.stops.again(math.inf if backs else to_go_m)
     if context.stops.too_many:
         return fail(context, t_s, "stuck: its lasers show no room where its plans lead")
     context.journal.count("replans")
-    if not backs:
-        why = "its lasers show no room where its plan leads: backs out"
-        out = back_out(context, t_s, belief, why, STEP_BACK_M)
-        if out is not None:
-            return out
-    return plan(context, t_s, belief)
+    why = "its lasers show no room where its plan leads: backs out"
+    out = step_clear(context, t_s, belief) if backs else back_out(context, t_s, belief, why, STEP_BACK_M)
+    return out or plan(context, t_s, belief)
+
+
+def step_clear(context: Context, t_s: float, belief: Belief) -> SteppingClear | None:
+    """Away from what it was stopped before, if a step leads there."""
+    step = context.step_clear.found(lambda command: context.may_drive(command, belief.pose))
+    if step is None:
+        return None
+    context.yielding.forget()
+    context.journal.say(t_s, "step-clear", "it may neither go on nor back: steps clear of what is near")
+    return SteppingClear(context, step, t_s + STEP_S)
 
 
 def give_way(context: Context, state: Driving, t_s: float, belief: Belief, act: Act) -> State:
