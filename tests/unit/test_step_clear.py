@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -17,6 +18,9 @@ from pilotage.sensors.readings import LidarScan, OdometryIncrement, Readings
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 from pilotage.stack.control.last_word import LastWord
 from pilotage.stack.control.step_clear import PATIENCE_S, StepClear
+from pilotage.stack.control.wander import WanderConfig
+from pilotage.stack.interface import Belief
+from pilotage.stack.navigator.wandering import Wandering
 from support.robots import told_of
 
 DT_S = 0.1
@@ -27,12 +31,22 @@ POST = [[0.06, 0.215, 0.10, 0.215]]
 ROOM = [[-1.0, -1.0, 1.0, -1.0], [1.0, -1.0, 1.0, 1.0], [1.0, 1.0, -1.0, 1.0], [-1.0, 1.0, -1.0, -1.0]]
 
 
+class Stub:
+    """A localizer that believes what it was told."""
+
+    def __init__(self, belief: Belief) -> None:
+        self.belief = belief
+
+    def step(self, readings: Readings) -> Belief:  # noqa: ARG002
+        return self.belief
+
+
 class Driver:
     """A robot that does at once what leaves, among walls, seen by one laser."""
 
     def __init__(self, sheet: LidarConfig, walls_m: list[list[float]], footprint: Footprint) -> None:
         sensors = {"lidar": sheet, "odometry": WheelOdometryConfig(rate_hz=10.0)}
-        robot = replace(told_of().robot, sensors=sensors, footprint=footprint)
+        self.robot = robot = replace(told_of().robot, sensors=sensors, footprint=footprint)
         self.word, self._sheet, self._walls_m = LastWord(robot), sheet, np.array(walls_m)
         self.step_clear, self.pose, self._t_s = StepClear(robot, self.word), Pose2(0.0, 0.0, 0.0), 0.0
         self._moved = OdometryIncrement(0.0, 0.0)
@@ -45,9 +59,14 @@ class Driver:
 
     def step(self, command: Twist) -> Twist:
         """Ask for a command, and drive what leaves."""
+        return self.steps(lambda readings: self.step_clear.instead_of(command, readings.t_s))
+
+    def steps(self, decides: Callable[[Readings], Twist]) -> Twist:
+        """Sense, decide, and drive what leaves."""
         self._t_s += DT_S
-        self.word.take_in(Readings(self._t_s, {"lidar": LidarScan(self.scan_m()), "odometry": self._moved}))
-        left = self.word.leaving(self.step_clear.instead_of(command, self._t_s))
+        readings = Readings(self._t_s, {"lidar": LidarScan(self.scan_m()), "odometry": self._moved})
+        self.word.take_in(readings)
+        left = self.word.leaving(decides(readings))
         pose = self.pose
         v, w = left.v_m_s * DT_S, left.w_rad_s * DT_S
         self.pose = Pose2(*exact_arc(pose.x_m, pose.y_m, pose.theta_rad, v, w))
@@ -110,3 +129,13 @@ def test_an_outline_is_taken_clear_with_its_corners() -> None:
         corners_m = driver.pose.placed(BOX)
         assert (corners_m[corners_m[:, 0] > 0.1, 1] < 0.21).all()
     assert driver.scan_m().min() > 0.24
+
+
+def test_who_is_lost_where_its_corners_cannot_turn_steps_clear() -> None:
+    """Between two walls, before a third: it stood there for as long as its sweep lasted."""
+    walls = [[-1.0, 0.215, 0.3, 0.215], [-1.0, -0.215, 0.3, -0.215], [0.3, -0.215, 0.3, 0.215]]
+    driver = Driver(ALL_ROUND, [*walls, [-3.0, -2.0, -3.0, 2.0]], Footprint.polygon(BOX))
+    wandering = Wandering(WanderConfig(), driver.robot, Stub(told_of().initial), driver.word)
+    for _ in range(300):
+        driver.steps(wandering.step)
+    assert driver.pose.x_m < -0.7

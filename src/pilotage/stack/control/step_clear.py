@@ -18,8 +18,8 @@ PATIENCE_S = 2.0
 """What walks goes by itself: so long it stands."""
 STEP_S, SPEED_M_S, TURN_RAD_S = 1.0, 0.15, 0.8
 """A step takes so long, and is no faster."""
-GAINS_M = 0.01
-"""Less gained is no step clear."""
+LOSES_M = 0.002
+"""Between two walls no step gains distance, and it may be elsewhere that it can turn: none may lose more."""
 
 
 def _anything(step: Twist) -> bool:  # noqa: ARG001 - whichever it is
@@ -64,18 +64,24 @@ class StepClear:
         step = self.found(may)
         if step is None:
             return STOP
-        self._step, self._until_s = step, t_s + STEP_S
+        self._until_s = t_s + STEP_S
         return step
 
     def found(self, may: Callable[[Twist], bool] = _anything) -> Twist | None:
-        """The step for ``STEP_S`` that leads clear of what was refused last; None where none does."""
-        shown_m = self._last_word.shown_m
+        """The step for ``STEP_S`` that leads clear of what was refused last; None where none does.
+
+        Of steps that gain as much the one that goes on as the last one did.
+        """
+        shown_m, last = self._last_word.shown_m, self._step
         now_m = self._away_m(STOP, shown_m)
-        gains = [(self._away_m(step, shown_m) - now_m, step) for step in self._steps]
-        for gain, step in sorted(gains, key=lambda pair: -pair[0]):
-            if gain < GAINS_M:
+        gains_m = {
+            step: self._away_m(step, shown_m) - now_m + LOSES_M * (step == last) for step in self._steps
+        }
+        for step in sorted(gains_m, key=lambda step: -gains_m[step]):
+            if gains_m[step] < -LOSES_M:
                 break
             if self._may(step, may):
+                self._step = step
                 return step
         return None
 

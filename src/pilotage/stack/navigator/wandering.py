@@ -8,6 +8,7 @@ from pilotage.core.types import STOP, Twist
 from pilotage.sensors.readings import Readings
 from pilotage.stack.control.last_word import LastWord
 from pilotage.stack.control.shunting import Shunting
+from pilotage.stack.control.step_clear import StepClear
 from pilotage.stack.control.wander import WanderConfig, Wanderer
 from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.localization.localizer import Abilities, Localizer
@@ -22,6 +23,8 @@ SHUNTS_S = 4.0
 
 class Wandering:
     """Wanders by the scanner, into nothing that a laser shows; without one the robot stands still.
+
+    Where corners have no room to turn either way it steps clear.
 
     A car, which cannot turn on the spot, does so ahead and back (``Shunting``).
 
@@ -40,6 +43,7 @@ class Wandering:
         self._least_m = robot.motion.least_turning_radius_m
         self._shunting = Shunting(robot, last_word.allows) if self._least_m > 0.0 else None
         self._shunts = False
+        self._step_clear = StepClear(robot, last_word)
         self._elsewhere_until_s = -math.inf
         self.plan_at_s = 0.0
 
@@ -59,7 +63,7 @@ class Wandering:
                 # Else on in the sense in which it turned: it would waver before what it turns away from.
                 self._turn_rad_s = math.copysign(self._turn_rad_s, command.w_rad_s)
             self._elsewhere_until_s = readings.t_s + ELSEWHERE_S
-        return self._turns()
+        return self._turns(readings.t_s)
 
     def _steered(self, shunting: Shunting, t_s: float, command: Twist) -> Twist:
         """The command as a car can drive it: turns, and what its lasers show no room for, by shunting."""
@@ -76,10 +80,10 @@ class Wandering:
             self._elsewhere_until_s = t_s + SHUNTS_S
         return shunting.step(self._turn_rad_s)
 
-    def _turns(self) -> Twist:
-        """On the spot, the other way round where corners have no room for this one; else it stands."""
+    def _turns(self, t_s: float) -> Twist:
+        """On the spot, the other way round where corners have no room for this one; else a step clear."""
         for turn in (Twist(0.0, self._turn_rad_s), Twist(0.0, -self._turn_rad_s)):
             if self._last_word.allows(turn):
                 self._turn_rad_s = turn.w_rad_s
                 return turn
-        return STOP
+        return self._step_clear.instead_of(Twist(0.0, self._turn_rad_s), t_s)
