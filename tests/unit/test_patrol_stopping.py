@@ -148,6 +148,37 @@ class TestStopping:
                 return
         pytest.fail(f"it stands at {pose}")
 
+    def test_who_rolls_on_weak_brakes_does_not_turn_into_the_wall_beside_it(self) -> None:
+        """A wall ahead, just beyond its stop, one to its left, and the field leads back, to the left."""
+        limits, safety = np.array([1.0, 0.3, 0.3, 2.0, 2.0, 0.2]), np.array([REACTION, 0.3, 0.06, 0.1, 1.4])
+        along = np.linspace(0.0, 1.19, 60)
+        left = np.column_stack([along, np.full(60, 0.42)])
+        ahead = np.column_stack([np.full(60, 1.19), np.linspace(-1.0, 0.42, 60)])
+        walls = np.concatenate([left, ahead])
+        rows, columns = np.mgrid[:41, :41]
+        time = 10.0 + 0.15 * (columns - 20) - 0.1 * 0.15 * (rows - 20)
+        pose, v, w = np.zeros(3), 0.7, 0.0
+        for step in range(60):
+            near = disc_returns.rotated(walls - pose[:2], -pose[2])
+            told_v, told_w, _ = voronoi_window.choose(
+                v,
+                w,
+                pose,
+                limits,
+                safety,
+                (near, NOBODY, NOBODY),
+                (time, -3.0, -3.0, 0.15),
+                NO_GATE,
+                (NO_MAP, 0.0, 0.0, 0.1),
+                0.0,
+                (0.9, 0.3, 0.5, 0.25, 6, 15),
+            )
+            for _ in range(20):
+                v, w = safe_stop.toward(v, told_v, 0.003), safe_stop.toward(w, told_w, 0.02)
+                pose = pose + 0.01 * np.array([v * math.cos(pose[2]), v * math.sin(pose[2]), w])
+                assert np.hypot(*(walls - pose[:2]).T).min() > 0.33, step
+        assert abs(pose[2]) > 1.0  # at rest it turned
+
     def test_who_gives_way_to_nobody_has_all_the_room_he_may_take(self) -> None:
         """Coming at 1.4 m/s while the robot stops from 1 m/s he takes 1 m; half of a mate's room is less."""
         ahead = np.array([[1.8, 0.0]])

@@ -182,7 +182,11 @@ def choose(
         return moves_v, moves_w, FREE
     # As fast as it can stop from there.
     w = math.copysign(math.sqrt(2.0 * turn_acceleration * abs(turn)), turn)
-    return best_v, min(max(w, low_w), high_w), HELD
+    w = min(max(w, low_w), high_w)
+    # Who rolls yet leaves by that the straight line on which it can stop.
+    if not stop_is_clear(v0, w0, best_v, w, limits, safety, within_reach, pose, known):
+        return best_v, best_w, HELD
+    return best_v, w, HELD
 
 
 @kernel

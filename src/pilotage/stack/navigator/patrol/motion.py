@@ -34,6 +34,8 @@ TALKS_PERIODS = 3.0
 """A body is that of a mate who said so lately that it is there."""
 AS_ONE = np.array([1.0, 1j])
 """A place as one number, for finding returns among others."""
+SLOWED = 1.0, 0.5, 0.25, 0.125, 0.0
+"""Shares of a speed that are tried; who rolls yet may have no room to turn meanwhile."""
 PEOPLE_M_S = 1.4
 """Who is no mate may come on at a walk, and gives way to nobody."""
 
@@ -263,8 +265,9 @@ class Motion:
         senses = self._senses
         if not senses.fresh:
             return self.command
-        v, now = command.v_m_s, senses.twist
-        for _ in range(4):
+        now = senses.twist
+        for share in SLOWED:
+            v = share * command.v_m_s
             if safe_stop.stop_is_clear(
                 now.v_m_s,
                 now.w_rad_s,
@@ -276,12 +279,9 @@ class Motion:
                 senses.pose.as_array(),
                 senses.field(lost=True),
             ):
-                break
-            v *= 0.5
-        else:
-            v = 0.0
-        self.command = Twist(v, command.w_rad_s)
-        return self.command
+                self.command = Twist(v, command.w_rad_s)
+                return self.command
+        return self.stand()
 
     def stand(self) -> Twist:
         """Stop."""
