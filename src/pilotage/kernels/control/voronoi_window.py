@@ -14,6 +14,7 @@ from pilotage.kernels.control.safe_stop import (
     ROLL_S,
     Field,
     Seen,
+    braking_turn,
     least_kept,
     open_floor,
     own_halves,
@@ -175,6 +176,8 @@ def choose(
                 moves, moves_v, moves_w, moves_rank = cost, v, w, rank
     if best_v > 1e-3:
         return best_v, best_w, FREE
+    if not best < np.inf:
+        best_w = braking_turn(v0, w0, limits, safety, within_reach, pose, known)
     turn = free_turn(pose, limits, safety, within_reach, field, known, heading_cost)
     if not abs(turn) < np.inf:
         return best_v, best_w, HELD

@@ -281,12 +281,25 @@ class Motion:
             ):
                 self.command = Twist(v, command.w_rad_s)
                 return self.command
-        return self.stand()
+        return self.stand(lost=True)
 
-    def stand(self) -> Twist:
-        """Stop."""
-        self.command = STOP
-        return STOP
+    def stand(self, *, lost: bool = False) -> Twist:
+        """Stop; straight on unless that leads into something."""
+        senses = self._senses
+        if senses.at_rest:
+            self.command = STOP
+        elif senses.fresh or self.command.v_m_s != 0.0:
+            w = safe_stop.braking_turn(
+                senses.twist.v_m_s,
+                senses.twist.w_rad_s,
+                self._limits,
+                self._safety,
+                (senses.near, senses.strange, self._give_way_to_nobody()),
+                senses.pose.as_array(),
+                senses.field(lost=lost),
+            )
+            self.command = Twist(0.0, w)
+        return self.command
 
 
 def is_near(points_m: FloatArray, reach_m: float) -> bool:
