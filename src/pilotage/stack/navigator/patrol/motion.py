@@ -12,11 +12,10 @@ from pilotage.models.motion.motion import MotionConfig
 from pilotage.stack.navigator.patrol.gate import NO_GATE, gate_at
 from pilotage.stack.navigator.patrol.onward import Onward
 from pilotage.stack.navigator.patrol.passage import CLAIM_M
-from pilotage.stack.navigator.patrol.senses import NO_DISCS, NO_POINTS, Senses
+from pilotage.stack.navigator.patrol.senses import LATENCY_S, NO_DISCS, NO_POINTS, Senses
 from pilotage.stack.navigator.patrol.still import StillWatch
 from pilotage.stack.patrol.roadmap import Roadmap
 
-LATENCY_S = 0.05
 ROUNDED_M = 0.03
 """Paths between nodes come nearer than these, and bodies are seen a little elsewhere."""
 DETOUR_SLACK_S = 1.0
