@@ -17,7 +17,7 @@ Seen: TypeAlias = tuple[FloatArray, FloatArray, FloatArray]
 """Returns, base frame: the nearest around it (K, 2), of what may move (M, 2), of people (P, 2)."""
 
 KEPT, TURNS = (1.0, 0.5, 0.0), 14
-"""Shares of margin and gap, and turn rates, that are tried where the straight stop is not clear."""
+"""Shares of the margin to walls, and turn rates, that are tried where the straight stop is not clear."""
 ROLL_S, LOOK_M, MOST_STEPS = 0.05, 0.05, 200
 """A command is followed in steps of time, and looked at after so many metres; braking takes 10 s at most."""
 
@@ -81,7 +81,7 @@ def braking_turn(
     it does not.
 
     Who stops sooner than was reckoned when it was told to turn leaves the arc that was clear; on weak brakes
-    it rolls on for a metre. What is kept, a half of it or nothing: the most of these that leaves a way.
+    it rolls on for a metre. The margin to walls, a half of it or none: the most that leaves a way.
     """
     if stop_is_clear(v0, w0, 0.0, 0.0, limits, safety, seen, pose, known):
         return 0.0
@@ -89,7 +89,7 @@ def braking_turn(
     low, high = max(-limits[3], w0 - most), min(limits[3], w0 + most)
     kept = safety.copy()
     for share in KEPT:
-        kept[2], kept[3] = share * safety[2], share * safety[3]
+        kept[2] = share * safety[2]
         best = np.inf
         for k in range(TURNS + 1):
             w = low + (high - low) * k / TURNS
