@@ -31,7 +31,7 @@ PROMPT = Driving(
 
 def plan_of(graph: PatrolGraph, *walks: tuple[list[int], int]) -> Plan:
     rounds = tuple(Round.through(graph, np.array(order)) for order, _ in walks)
-    return Plan(rounds, tuple(size for _, size in walks), 0.0, 0.0)
+    return Plan(rounds, tuple(size for _, size in walks), (1.0,) * len(walks), 0.0, 0.0)
 
 
 @pytest.mark.parametrize("size", [1, 2, 3, 8])

@@ -108,7 +108,7 @@ def test_walks_changed_at_random_cost_less(seed: int, sizes: tuple[int, ...], ga
 def test_a_pair_that_shares_a_short_round_keeps_no_plan_from_being_taken() -> None:
     """All rounds were charged for one that is shared: a share for each was taken, worse in both."""
     graph = random_graph(1)
-    plan = best_plan(setting_for(graph, (0, 1, 2, 3)), 4, AdaptiveRoundsConfig())
+    plan = best_plan(setting_for(graph, (0, 1, 2, 3)), [1.0] * 4, AdaptiveRoundsConfig())
     alone = partition(graph, (1, 1, 1, 1))
     assert plan.worst_m < alone.worst_m
     assert plan.mean_m < 0.97 * alone.mean_m
@@ -117,17 +117,17 @@ def test_a_pair_that_shares_a_short_round_keeps_no_plan_from_being_taken() -> No
 def test_rounds_that_only_turn_back_are_not_taken_for_short() -> None:
     """Around a ring shares of two places promise the tour's worst and mean; each of them is half turns."""
     setting = setting_for(ring(), (0, 2, 4, 6))
-    assert best_plan(setting, 4, AdaptiveRoundsConfig()).sizes == (1, 1, 1, 1)
-    assert best_plan(replace(setting, turn_m=0.8), 4, AdaptiveRoundsConfig()).sizes == (4,)
+    assert best_plan(setting, [1.0] * 4, AdaptiveRoundsConfig()).sizes == (1, 1, 1, 1)
+    assert best_plan(replace(setting, turn_m=0.8), [1.0] * 4, AdaptiveRoundsConfig()).sizes == (4,)
 
 
 def test_who_hears_nobody_shares_fewer_rounds() -> None:
     """A ring is gone round by all who keep apart; legs that are late at random bring the deaf together."""
     talking = replace(setting_for(ring(), (0, 2, 4, 6)), turn_m=0.8)
     deaf = replace(talking, talks=False)
-    assert best_plan(talking, 4, AdaptiveRoundsConfig()).sizes == (4,)
-    assert best_plan(deaf, 4, AdaptiveRoundsConfig()).sizes == (1, 1, 1, 1)
-    assert best_plan(deaf, 4, AdaptiveRoundsConfig(leg_spread_m=0.0)).sizes == (4,)
+    assert best_plan(talking, [1.0] * 4, AdaptiveRoundsConfig()).sizes == (4,)
+    assert best_plan(deaf, [1.0] * 4, AdaptiveRoundsConfig()).sizes == (1, 1, 1, 1)
+    assert best_plan(deaf, [1.0] * 4, AdaptiveRoundsConfig(leg_spread_m=0.0)).sizes == (4,)
 
 
 @pytest.mark.parametrize("shut", [NONE_SHUT, ShutPaths(unreached=(3,))])
@@ -138,7 +138,7 @@ def test_plans_for_who_is_left_are_forecast_once_for_all_robots(shut: ShutPaths)
     for robot in range(4):
         left = OpenGraph.of(graph, passages, shut)
         setting = replace(setting_for(ring(), (0, 2, 4)), robot=robot % 3, passages=left.passages)
-        best_plan(replace(setting, graph=left.graph), 3, AdaptiveRoundsConfig(meeting_m=1.25))
+        best_plan(replace(setting, graph=left.graph), [1.0] * 3, AdaptiveRoundsConfig(meeting_m=1.25))
         if robot == 0:
             first = forecast_m.cache_info().misses
     assert forecast_m.cache_info().misses == first > before

@@ -15,7 +15,7 @@ from support.patrol_floors import on_floor, row, two_doors, walled, with_corrido
 
 def plan_of(graph: PatrolGraph, *walks: tuple[list[int], int]) -> Plan:
     rounds = tuple(Round.through(graph, np.array(order)) for order, _ in walks)
-    return Plan(rounds, tuple(size for _, size in walks), 0.0, 0.0)
+    return Plan(rounds, tuple(size for _, size in walks), (1.0,) * len(walks), 0.0, 0.0)
 
 
 def spans(found: list[Section]) -> list[tuple[float, float]]:

@@ -148,6 +148,64 @@ class TestStopping:
                 return
         pytest.fail(f"it stands at {pose}")
 
+    def test_who_rolls_on_weak_brakes_does_not_turn_into_the_wall_beside_it(self) -> None:
+        """A wall ahead, just beyond its stop, one to its left, and the field leads back, to the left."""
+        limits, safety = np.array([1.0, 0.3, 0.3, 2.0, 2.0, 0.2]), np.array([REACTION, 0.3, 0.06, 0.1, 1.4])
+        along = np.linspace(0.0, 1.19, 60)
+        left = np.column_stack([along, np.full(60, 0.42)])
+        ahead = np.column_stack([np.full(60, 1.19), np.linspace(-1.0, 0.42, 60)])
+        walls = np.concatenate([left, ahead])
+        rows, columns = np.mgrid[:41, :41]
+        time = 10.0 + 0.15 * (columns - 20) - 0.1 * 0.15 * (rows - 20)
+        pose, v, w = np.zeros(3), 0.7, 0.0
+        for step in range(60):
+            near = disc_returns.rotated(walls - pose[:2], -pose[2])
+            told_v, told_w, _ = voronoi_window.choose(
+                v,
+                w,
+                pose,
+                limits,
+                safety,
+                (near, NOBODY, NOBODY),
+                (time, -3.0, -3.0, 0.15),
+                NO_GATE,
+                (NO_MAP, 0.0, 0.0, 0.1),
+                0.0,
+                (0.9, 0.3, 0.5, 0.25, 6, 15),
+            )
+            for _ in range(20):
+                v, w = safe_stop.toward(v, told_v, 0.003), safe_stop.toward(w, told_w, 0.02)
+                pose = pose + 0.01 * np.array([v * math.cos(pose[2]), v * math.sin(pose[2]), w])
+                assert np.hypot(*(walls - pose[:2]).T).min() > 0.33, step
+        assert abs(pose[2]) > 1.0  # at rest it turned
+
+    @pytest.mark.parametrize("side", [1.0, -1.0])
+    def test_who_stops_in_a_bend_does_not_roll_off_it_into_the_wall(self, side: float) -> None:
+        """On weak brakes it rolls on for 0.6 m: straight on that ends in the wall outside of the bend."""
+        limits, safety = np.array([1.2, 1.0, 1.0, 2.0, 8.0, 0.2]), np.array([REACTION, 0.25, 0.06, 0.1, 1.4])
+        along = np.linspace(-0.5, 1.5, 200)
+        wall = np.column_stack([along, -side * (0.36 - 0.23 * along)])
+        least = []
+        for is_told in (True, False):
+            pose, v, w = np.zeros(3), 1.1, 0.85 * side
+            for _ in range(8):
+                near = disc_returns.rotated(wall - pose[:2], -pose[2])
+                seen, known = (near, NOBODY, NOBODY), (NO_MAP, 0.0, 0.0, 0.1)
+                turn = safe_stop.braking_turn(v, w, limits, safety, seen, pose, known)
+                for _ in range(20):
+                    v = safe_stop.toward(v, 0.0, 0.01)
+                    w = safe_stop.toward(w, turn if is_told else 0.0, 0.08)
+                    pose = pose + 0.01 * np.array([v * math.cos(pose[2]), v * math.sin(pose[2]), w])
+                    least.append(float(np.hypot(*(wall - pose[:2]).T).min()))
+            if is_told:
+                assert min(least) > 0.25
+        assert min(least) < 0.25
+
+    def test_who_stops_straight_on_where_that_is_clear_is_told_no_turn(self) -> None:
+        limits, safety = np.array([1.2, 1.0, 1.0, 2.0, 8.0, 0.2]), np.array([REACTION, 0.25, 0.06, 0.1, 1.4])
+        seen, known = (np.array([[1.2, 0.0]]), NOBODY, NOBODY), (NO_MAP, 0.0, 0.0, 0.1)
+        assert safe_stop.braking_turn(1.0, 1.0, limits, safety, seen, np.zeros(3), known) == 0.0
+
     def test_who_gives_way_to_nobody_has_all_the_room_he_may_take(self) -> None:
         """Coming at 1.4 m/s while the robot stops from 1 m/s he takes 1 m; half of a mate's room is less."""
         ahead = np.array([[1.8, 0.0]])

@@ -227,6 +227,29 @@ class TestPassages:
         context = build(mission_of(corridor(3.0, 1, 10.0), seed=0)).team[0].stack._context  # type: ignore[attr-defined]
         assert context.pass_m == pytest.approx(2.0 * context.radius_m + BESIDE_M)
 
+    @pytest.mark.parametrize(("braking_m_s2", "is_far"), [(2.0, False), (0.3, True)])
+    def test_who_stops_late_looks_as_far_as_that(self, braking_m_s2: float, *, is_far: bool) -> None:
+        """It looked 1.6 m ahead, and where its map was half a metre off touched a wall from 1.4 m/s."""
+        values = corridor(3.0, 1, 1.0)
+        values["robot"]["motion"] |= {"max_speed_m_s": 1.2, "max_acceleration_m_s2": braking_m_s2}
+        experiment = build(mission_of(values, seed=0))
+        run_loop(experiment)
+        near = experiment.team[0].stack._context.near  # type: ignore[attr-defined]
+        assert (np.hypot(*near.T).max() > 1.6) == is_far
+
+    def test_a_small_and_a_wide_one_agree_on_what_has_room_for_both(self) -> None:
+        """As if mates were its like a small one did not claim what it could not pass a wide one in."""
+        values = corridor(1.5, 3, 10.0)
+        values["robots"] = [
+            {"footprint": {"radius_m": radius_m}, "start": {"x_m": x_m, "y_m": 3.0}}
+            for radius_m, x_m in ((0.2, 2.0), (0.34, 14.0), (0.3, 8.0))
+        ]
+        rooms_m = [
+            member.stack._context.pass_m  # type: ignore[attr-defined]
+            for member in build(mission_of(values, seed=0)).team
+        ]
+        assert rooms_m == pytest.approx([0.54 + BESIDE_M, 0.64 + BESIDE_M, 0.64 + BESIDE_M])
+
     def test_a_robot_that_died_in_the_passage_is_not_run_into(self) -> None:
         failures = [{"robot": 0, "at_s": 12.0}, {"robot": 1, "kind": "radio", "at_s": 1.0}]
         metrics = judged(corridor(1.5, 2, 90.0, failures=failures), seed=1)

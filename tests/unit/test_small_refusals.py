@@ -256,6 +256,16 @@ def test_starts_of_a_team_are_told_by_the_name_they_were_given_under() -> None:
         load_mission("museum-patrol", ["team.size=2", "team.starts=[[1, 1], [3, 3]]"], 0)
 
 
+def test_a_laser_too_coarse_for_the_smallest_mate_is_refused() -> None:
+    """As if all were as wide as the robot itself a wide one met a small one by one beam."""
+    small = "{footprint: {radius_m: 0.2}, sensors: {lidar: {name: lidar, rate_hz: 5, beams: 360}}}"
+    wide = "{footprint: {radius_m: 0.4}}"
+    beams = "robot.sensors.lidar.beams=40"
+    build(load_mission("museum-patrol", [f"robots=[{wide}, {wide}]", "team.size=2", beams], 0))
+    with pytest.raises(InputError, match=r"beams: expected \d+ or more, .* found 40$"):
+        build(load_mission("museum-patrol", [f"robots=[{wide}, {small}]", "team.size=2", beams], 0))
+
+
 @pytest.mark.parametrize(
     ("settings", "least"),
     [(["robot.sensors.lidar.beams=24"], 36), (["robot.motion.max_speed_m_s=0.3"], None)],

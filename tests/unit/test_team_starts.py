@@ -51,6 +51,15 @@ def test_where_no_passage_has_more_room_all_of_the_floor_will_do() -> None:
     assert floor.draw(np.random.default_rng(0), part=floor.easy) is not None
 
 
+def test_everybody_begins_where_the_widest_of_the_team_can_come() -> None:
+    radii = ", ".join(f"{{footprint: {{radius_m: {radius_m}}}}}" for radius_m in (0.2, 0.2, 0.5, 0.2, 0.2))
+    mission = load_mission("museum-patrol", (f"robots=[{radii}]", "team.size=5"), 0)
+    for seed in range(4):
+        run = mission.run.model_copy(update={"seed": seed})
+        settled = settle_places(mission.model_copy(update={"run": run}), WORLD)
+        assert all(robot.start is not None and robot.start.x_m < 8.0 for robot in settled.robots)
+
+
 @pytest.mark.parametrize(
     ("about", "low_x_m", "high_x_m"),
     [((9.0, 2.0), 8.0, 11.0), ((8.2, 4.5), 8.0, 11.0), ((2.0, 0.0), 0.0, 8.0), ((50.0, 2.0), 0.0, 8.0)],

@@ -95,7 +95,7 @@ def _with_drawn_starts(mission: Mission, chart: WorldMap, about: tuple[float, fl
     """The mission with a place for every robot that has none: drawn in turn, apart from those before.
 
     They are places that ``world.start`` is connected to, or what the task is about, or on the floor that is
-    meant.
+    meant, for the widest of the team: what its task asks of all lies where each of them can be.
 
     Raises
     ------
@@ -110,22 +110,23 @@ def _with_drawn_starts(mission: Mission, chart: WorldMap, about: tuple[float, fl
         for robot, radius_m in zip(mission.robots, radii_m, strict=True)
         if robot.start is not None
     ]
+    if len(placed) == len(mission.robots):
+        return mission
     robots: list[RobotConfig] = []
-    floors: dict[float, OpenFloor] = {}
-    full: set[float] = set()
+    clear_m = max(radii_m) + ROOM_M
+    floor, is_full = OpenFloor(chart, clear_m, near, about), False
     for index, robot in enumerate(mission.robots):
         start = robot.start
         if start is None:
-            clear_m = radii_m[index] + ROOM_M
             # Bodies stand apart however little is asked for.
-            apart = [(place, max(mission.team.spacing_m, clear_m + radius_m)) for place, radius_m in placed]
-            if clear_m not in floors:
-                floors[clear_m] = OpenFloor(chart, clear_m, near, about)
-            floor = floors[clear_m]
-            if clear_m not in full:
+            apart = [
+                (place, max(mission.team.spacing_m, radii_m[index] + ROOM_M + radius_m))
+                for place, radius_m in placed
+            ]
+            if not is_full:
                 start = floor.draw(rng, apart, floor.easy)
             if start is None:
-                full.add(clear_m)
+                is_full = True
                 start = floor.draw(rng, apart, floor.in_cells(placed[0][0] if placed else None))
             if start is None and not placed:
                 raise InputError(

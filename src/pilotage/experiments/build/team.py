@@ -138,6 +138,8 @@ def _shares(
     assert mission.team.strategy is not None, "the task looked"
     radios = [radio for sheet in sheets for radio in sheet.sensors_of(RadioConfig).values()]
     talks = sum(radio.loss < 1.0 for radio in radios) > 1
+    speeds_m_s = np.array([sheet.motion.top_speed_m_s for sheet in sheets])
+    radii_m = tuple(sheet.radius_m for sheet in sheets)
     shares = []
     for index, sheet in enumerate(sheets):
         setting = PatrolSetting(
@@ -151,9 +153,11 @@ def _shares(
             turn_m=site.turn_m,
             visit_m=site.visit_m,
             talks=talks,
+            speeds_m_s=speeds_m_s.copy(),
         )
         strategy = build_component(STRATEGIES, mission.team.strategy, "strategy", setting)
-        shares.append(PatrolTask(graph, site.visit_m, site.near_m, site.starts, index, strategy, supply))
+        share = PatrolTask(graph, site.visit_m, site.near_m, site.starts, index, strategy, radii_m, supply)
+        shares.append(share)
     return shares
 
 

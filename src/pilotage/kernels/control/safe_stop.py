@@ -16,6 +16,8 @@ Field: TypeAlias = tuple[FloatArray, float, float, float]
 Seen: TypeAlias = tuple[FloatArray, FloatArray, FloatArray]
 """Returns, base frame: the nearest around it (K, 2), of what may move (M, 2), of people (P, 2)."""
 
+KEPT, TURNS = (1.0, 0.5, 0.0), 14
+"""Shares of the margin to walls, and turn rates, that are tried where the straight stop is not clear."""
 ROLL_S, LOOK_M, MOST_STEPS = 0.05, 0.05, 200
 """A command is followed in steps of time, and looked at after so many metres; braking takes 10 s at most."""
 
@@ -63,6 +65,39 @@ def stop_is_clear(
     limit = least_kept(safety, seen, pose, known)
     own = own_halves(seen[1], safety)
     return roll_is_clear(lengths, speeds, cosines, sines, safety, seen, own, limit, pose, known)
+
+
+@kernel
+def braking_turn(
+    v0: float,
+    w0: float,
+    limits: FloatArray,
+    safety: FloatArray,
+    seen: Seen,
+    pose: FloatArray,
+    known: Field,
+) -> float:
+    """The turn rate to tell who is to stop: none, or the least with which it ends clear where straight on
+    it does not.
+
+    Who stops sooner than was reckoned when it was told to turn leaves the arc that was clear; on weak brakes
+    it rolls on for a metre. The margin to walls, a half of it or none: the most that leaves a way.
+    """
+    if stop_is_clear(v0, w0, 0.0, 0.0, limits, safety, seen, pose, known):
+        return 0.0
+    most = limits[4] * limits[5]
+    low, high = max(-limits[3], w0 - most), min(limits[3], w0 + most)
+    kept = safety.copy()
+    for share in KEPT:
+        kept[2] = share * safety[2]
+        best = np.inf
+        for k in range(TURNS + 1):
+            w = low + (high - low) * k / TURNS
+            if abs(w) < abs(best) and stop_is_clear(v0, w0, 0.0, w, limits, kept, seen, pose, known):
+                best = w
+        if best < np.inf:
+            return best
+    return 0.0
 
 
 @kernel

@@ -14,6 +14,7 @@ from pilotage.kernels.control.safe_stop import (
     ROLL_S,
     Field,
     Seen,
+    braking_turn,
     least_kept,
     open_floor,
     own_halves,
@@ -175,6 +176,8 @@ def choose(
                 moves, moves_v, moves_w, moves_rank = cost, v, w, rank
     if best_v > 1e-3:
         return best_v, best_w, FREE
+    if not best < np.inf:
+        best_w = braking_turn(v0, w0, limits, safety, within_reach, pose, known)
     turn = free_turn(pose, limits, safety, within_reach, field, known, heading_cost)
     if not abs(turn) < np.inf:
         return best_v, best_w, HELD
@@ -182,7 +185,11 @@ def choose(
         return moves_v, moves_w, FREE
     # As fast as it can stop from there.
     w = math.copysign(math.sqrt(2.0 * turn_acceleration * abs(turn)), turn)
-    return best_v, min(max(w, low_w), high_w), HELD
+    w = min(max(w, low_w), high_w)
+    # Who rolls yet leaves by that the straight line on which it can stop.
+    if not stop_is_clear(v0, w0, best_v, w, limits, safety, within_reach, pose, known):
+        return best_v, best_w, HELD
+    return best_v, w, HELD
 
 
 @kernel

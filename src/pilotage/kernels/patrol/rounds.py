@@ -216,10 +216,22 @@ def change(orders: IntArray, counts: IntArray, near: IntArray, draw: FloatArray)
 
 
 @kernel
+def judge_group(
+    order: IntArray, size: int, pace: float, ground: Ground, worst: FloatArray, mean: FloatArray
+) -> None:
+    """``judge_walk`` of robots that drive at a pace: how far one of pace 1 drives meanwhile."""
+    judge_walk(order, size, ground, worst, mean)
+    for vertex in range(worst.shape[0]):
+        worst[vertex] /= pace
+        mean[vertex] /= pace
+
+
+@kernel
 def anneal(
     orders: IntArray,
     counts: IntArray,
     sizes: IntArray,
+    paces: FloatArray,
     near: IntArray,
     draws: FloatArray,
     heats: tuple[float, float],
@@ -233,8 +245,8 @@ def anneal(
     ----------
     orders, counts
         The vertices that each group's walk goes through; each vertex once. The best are left in them.
-    sizes
-        (G,) robots of each group.
+    sizes, paces
+        (G,) robots of each group, and their speed as a share of the fastest ones'.
     near
         (V, K) other vertices near to each; at least one.
     draws
@@ -246,7 +258,8 @@ def anneal(
     """
     worst, mean = np.empty(orders.shape), np.empty(orders.shape)
     for group in range(orders.shape[0]):
-        judge_walk(orders[group, : counts[group]], sizes[group], ground, worst[group], mean[group])
+        order = orders[group, : counts[group]]
+        judge_group(order, sizes[group], paces[group], ground, worst[group], mean[group])
     now = plan_cost(worst, mean, sizes, mean_weight, sharing_cost)
     best, best_orders, best_counts = now, orders.copy(), counts.copy()
     kept_orders, kept_counts = orders.copy(), counts.copy()
@@ -257,7 +270,8 @@ def anneal(
         if one < 0:
             continue
         for group in (one, other):
-            judge_walk(orders[group, : counts[group]], sizes[group], ground, worst[group], mean[group])
+            order = orders[group, : counts[group]]
+            judge_group(order, sizes[group], paces[group], ground, worst[group], mean[group])
             if one == other:
                 break
         new = plan_cost(worst, mean, sizes, mean_weight, sharing_cost)

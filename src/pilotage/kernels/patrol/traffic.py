@@ -29,8 +29,8 @@ class Walks(NamedTuple):
     ----------
     first_stop, first_section
         (G + 1,) where each walk's stops and sections begin.
-    length
-        (G,) of each.
+    length, pace
+        (G,) of each, and the speed of who goes round it as a share of full speed.
     stops, legs, turns
         (K,) vertices, lengths of the legs after them, and what turning back there takes.
     mouths, through
@@ -49,6 +49,7 @@ class Walks(NamedTuple):
     first_stop: IntArray
     first_section: IntArray
     length: FloatArray
+    pace: FloatArray
     stops: IntArray
     legs: FloatArray
     turns: FloatArray
@@ -157,7 +158,7 @@ def drive_rounds(
             if team.is_at_stop[robot]:
                 here = team.stop[robot] - 1 if team.stop[robot] > first else end - 1
                 if manner.waits and _is_ahead(walks, team, robot, here, manner):
-                    team.waited[robot] += manner.step
+                    team.waited[robot] += manner.step * walks.pace[group[robot]]
                     last[walks.stops[here]] = now
                     continue
                 team.waited[robot], team.is_at_stop[robot] = 0.0, False
@@ -166,7 +167,8 @@ def drive_rounds(
             if team.to_stop[robot] <= 0.0:
                 here = team.stop[robot]
                 vertex = walks.stops[here]
-                _judge(judged, max(0.0, now - last[vertex] - 2.0 * manner.visit), now, manner.warm_up)
+                across = 2.0 * manner.visit / walks.pace[group[robot]]
+                _judge(judged, max(0.0, now - last[vertex] - across), now, manner.warm_up)
                 team.rest[robot] = walks.turns[here]
                 last[vertex] = now + team.rest[robot]
                 team.to_stop[robot] += walks.legs[here]
@@ -362,7 +364,8 @@ def _is_close(walks: Walks, team: Team, robot: int) -> bool:
 @kernel
 def _advance(walks: Walks, team: Team, robot: int, now: float, manner: Manner) -> bool:
     """Drive a step along the walk, into and out of sections, unless others are in the way."""
-    group, step = team.group[robot], manner.step * team.pace[robot]
+    group = team.group[robot]
+    step = manner.step * team.pace[robot] * walks.pace[group]
     length = walks.length[group]
     if team.within[robot] == NONE and team.section[robot] != NONE:
         if team.to_mouth[robot] < CLAIM_M:

@@ -61,7 +61,7 @@ class Driving:
 
 @lru_cache(maxsize=1024)
 def forecast_m(plan: Plan, graph: PatrolGraph, passages: Passages, driving: Driving) -> tuple[float, float]:
-    """Worst and mean idleness times speed, on average over a few times; the same for whoever asks.
+    """Worst and mean idleness times full speed, on average over a few times; the same for whoever asks.
 
     Robots begin evenly spread on their rounds. Of passages with room for one those who come the other way
     are kept out (``Section``), in the order in which they came; who comes the same way follows.
@@ -71,7 +71,7 @@ def forecast_m(plan: Plan, graph: PatrolGraph, passages: Passages, driving: Driv
     lengths = np.repeat([walk.length_m for walk in plan.rounds], plan.sizes)
     place = np.concatenate([np.arange(size) / size for size in plan.sizes])
     spaced_m = sum(walk.length_m for walk in plan.rounds) / len(group)
-    longest_m = max(float(lengths.max()), 2.0 * spaced_m, 1.0)
+    longest_m = max(float((lengths / walks.pace[group]).max()), 2.0 * spaced_m, 1.0)
     manner = traffic.Manner(
         float(np.clip(spaced_m / STEPS, LEAST_M, MOST_M)),
         longest_m,
@@ -106,6 +106,7 @@ def _walks(plan: Plan, graph: PatrolGraph, passages: Passages, driving: Driving)
         np.cumsum([0, *(len(walk.stops) for walk in rounds)]),
         np.cumsum([0, *(len(walk) for walk in narrow)]),
         np.array([walk.length_m for walk in rounds]),
+        np.array(plan.paces),
         np.concatenate([walk.stops for walk in rounds]),
         np.concatenate([np.diff(walk.at_m, append=walk.length_m) for walk in rounds]),
         np.concatenate([np.diff(turned_m(walk.stops, places, driving.turn_m)) for walk in rounds]),

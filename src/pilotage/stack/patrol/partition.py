@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -48,14 +49,17 @@ class Plan:
 
     Attributes
     ----------
+    paces
+        Speed of the slowest robot on each, as a share of the team's fastest.
     worst_m, mean_m
         Worst and mean distance that the walk's next robot still has to a vertex since its last visit:
-        idleness times speed, robots evenly spread. A vertex of several walks counts where it is visited more
-        often.
+        idleness times the fastest one's speed, robots evenly spread. A vertex of several walks counts where
+        it is visited more often.
     """
 
     rounds: tuple[Round, ...]
     sizes: tuple[int, ...]
+    paces: tuple[float, ...]
     worst_m: float
     mean_m: float
 
@@ -65,8 +69,30 @@ def even_sizes(robots: int, groups: int) -> tuple[int, ...]:
     return tuple(robots // groups + (k < robots % groups) for k in range(groups))
 
 
+def groupings(paces: Sequence[float], groups: int) -> set[tuple[tuple[int, ...], tuple[float, ...]]]:
+    """Sizes and paces of groups of robots (N,) that are about as fast, the fastest first.
+
+    Even groups; and those in which fast robots wait least for slow ones, of such the most even ones.
+    """
+    ordered, count = sorted(paces, reverse=True), len(paces)
+    even = even_sizes(count, groups)
+
+    def slowest(sizes: tuple[int, ...]) -> tuple[float, ...]:
+        return tuple(ordered[end - 1] for end in itertools.accumulate(sizes))
+
+    def lost(sizes: tuple[int, ...]) -> tuple[float, int]:
+        kept = sum(size * pace for size, pace in zip(sizes, slowest(sizes), strict=True))
+        return round(sum(ordered) - kept, 6), sum(size * size for size in sizes)
+
+    if ordered[0] == ordered[-1]:
+        return {(even, slowest(even))}
+    cuts = itertools.combinations(range(1, count), groups - 1)
+    some = [tuple(np.diff([0, *cut, count]).tolist()) for cut in cuts]
+    return {(sizes, slowest(sizes)) for sizes in (even, min(some, key=lost))}
+
+
 @lru_cache(maxsize=256)
-def partition(graph: PatrolGraph, sizes: tuple[int, ...]) -> Plan:
+def partition(graph: PatrolGraph, sizes: tuple[int, ...], paces: tuple[float, ...] | None = None) -> Plan:
     """Walks for groups of robots such that the longest, per robot, is short; the same for whoever asks.
 
     The best tour of all vertices is cut into pieces as long as the groups are large (Frederickson, Hecht and
@@ -77,13 +103,27 @@ def partition(graph: PatrolGraph, sizes: tuple[int, ...]) -> Plan:
     ----------
     sizes
         Robots of each group; at most as many groups as vertices.
+    paces
+        Speed of each group's slowest robot, as a share of full speed; None: all alike.
     """
-    return _plan(graph, [Round.best(graph, tuple(sorted(share))) for share in _shares(graph, sizes)], sizes)
+    paces = paces or (1.0,) * len(sizes)
+    shares = _shares(graph, _strengths(sizes, paces))
+    return _plan(graph, [Round.best(graph, tuple(sorted(share))) for share in shares], sizes, paces)
+
+
+def _strengths(sizes: tuple[int, ...], paces: tuple[float, ...]) -> tuple[float, ...]:
+    """How many robots at full speed each group stands for."""
+    return tuple(size * pace for size, pace in zip(sizes, paces, strict=True))
 
 
 @lru_cache(maxsize=256)
 def annealed(
-    graph: PatrolGraph, sizes: tuple[int, ...], mean_weight: float, sharing_cost: float, turn_m: float = 0.0
+    graph: PatrolGraph,
+    sizes: tuple[int, ...],
+    mean_weight: float,
+    sharing_cost: float,
+    turn_m: float = 0.0,
+    paces: tuple[float, ...] | None = None,
 ) -> Plan:
     """Walks whose worst and mean distances are short together; the same for whoever asks.
 
@@ -92,7 +132,7 @@ def annealed(
 
     Parameters
     ----------
-    sizes
+    sizes, paces
         As ``partition``.
     mean_weight
         What the mean distance counts beside the worst.
@@ -103,31 +143,38 @@ def annealed(
     """
     count = len(graph)
     if len(sizes) == 1 or len(sizes) == count:
-        return partition(graph, sizes)
-    orders, counts = _without_turns(graph, sizes, mean_weight, sharing_cost)
+        return partition(graph, sizes, paces)
+    paces = paces or (1.0,) * len(sizes)
+    orders, counts = _without_turns(graph, sizes, paces, mean_weight, sharing_cost)
     if turn_m > 0.0:
         # Turns make walks hard to change: they count from where walks are short without them.
         heats = HEATS[:TURNING]
-        orders, counts = _tried(graph, sizes, (orders, counts), heats, (mean_weight, sharing_cost, turn_m))
+        costs = mean_weight, sharing_cost, turn_m
+        orders, counts = _tried(graph, sizes, paces, (orders, counts), heats, costs)
     walks = [Round.through(graph, order[:number]) for order, number in zip(orders, counts, strict=True)]
-    return _plan(graph, walks, sizes)
+    return _plan(graph, walks, sizes, paces)
 
 
 @lru_cache(maxsize=256)
 def _without_turns(
-    graph: PatrolGraph, sizes: tuple[int, ...], mean_weight: float, sharing_cost: float
+    graph: PatrolGraph,
+    sizes: tuple[int, ...],
+    paces: tuple[float, ...],
+    mean_weight: float,
+    sharing_cost: float,
 ) -> Orders:
     """Orders of the groups' walks from the levelled shares, turning back free."""
     orders, counts = np.zeros((len(sizes), len(graph)), dtype=np.int64), np.zeros(len(sizes), dtype=np.int64)
-    for group, share in enumerate(_shares(graph, sizes)):
+    for group, share in enumerate(_shares(graph, _strengths(sizes, paces))):
         order = _order(graph.shortest_m, share)
         orders[group, : len(order)], counts[group] = order, len(order)
-    return _tried(graph, sizes, (orders, counts), HEATS, (mean_weight, sharing_cost, 0.0))
+    return _tried(graph, sizes, paces, (orders, counts), HEATS, (mean_weight, sharing_cost, 0.0))
 
 
 def _tried(
     graph: PatrolGraph,
     sizes: tuple[int, ...],
+    paces: tuple[float, ...],
     begin: Orders,
     heats: Sequence[float],
     costs: tuple[float, float, float],
@@ -135,9 +182,10 @@ def _tried(
     """The best of changes at random, once from each heat; what the mean, sharing and turning back cost."""
     mean_weight, sharing_cost, turn_m = costs
     near = np.ascontiguousarray(_near(graph))
-    each_m = Round.best(graph).length_m / sum(sizes)
+    each_m = Round.best(graph).length_m / sum(_strengths(sizes, paces))
     hops, edges_m = np.ascontiguousarray(graph.next_hop), np.ascontiguousarray(graph.edges_m)
-    ground, many = (hops, edges_m, np.ascontiguousarray(graph.vertices_xy_m), turn_m), np.array(sizes)
+    ground = hops, edges_m, np.ascontiguousarray(graph.vertices_xy_m), turn_m
+    many, fast = np.array(sizes), np.array(paces)
     # Every robot must come to the same plan: no stream of its own. With turns it goes on where it was.
     used = 0 if turn_m == 0.0 else len(HEATS) * CHANGES * DRAWS
     rng = np.random.Generator(np.random.PCG64(0).advance(used))
@@ -145,7 +193,7 @@ def _tried(
     for heat in heats:
         orders, counts = begin[0].copy(), begin[1].copy()
         draws, warm_cold = rng.random((CHANGES, DRAWS)), (heat * each_m, COLD * each_m)
-        cost = anneal(orders, counts, many, near, draws, warm_cold, mean_weight, sharing_cost, ground)
+        cost = anneal(orders, counts, many, fast, near, draws, warm_cold, mean_weight, sharing_cost, ground)
         if best is None or cost < best[0]:
             best = float(cost), orders, counts
     assert best is not None  # there are heats
@@ -153,17 +201,17 @@ def _tried(
 
 
 @lru_cache(maxsize=256)
-def _shares(graph: PatrolGraph, sizes: tuple[int, ...]) -> tuple[frozenset[int], ...]:
-    """What each group visits."""
+def _shares(graph: PatrolGraph, strengths: tuple[float, ...]) -> tuple[frozenset[int], ...]:
+    """What each group visits, that is as strong as so many robots."""
     order = Round.best(graph).stops
     order = order[np.sort(np.unique(order, return_index=True)[1])]
-    if len(sizes) == 1:
+    if len(strengths) == 1:
         return (frozenset(order.tolist()),)
-    search = _Levelling(graph, sizes)
+    search = _Levelling(graph, strengths)
     best: tuple[float, list[set[int]]] | None = None
     count = len(order)
     for begin in sorted({round(k * count / BEGINNINGS) % count for k in range(BEGINNINGS)}):
-        shares = _cut(graph, np.roll(order, -begin), sizes)
+        shares = _cut(graph, np.roll(order, -begin), strengths)
         cost = search.run(shares)
         if best is None or cost < best[0] * (1.0 - 1e-9):
             best = cost, shares
@@ -171,11 +219,15 @@ def _shares(graph: PatrolGraph, sizes: tuple[int, ...]) -> tuple[frozenset[int],
     return tuple(frozenset(share) for share in best[1])
 
 
-def _plan(graph: PatrolGraph, walks: Sequence[Round], sizes: tuple[int, ...]) -> Plan:
+def _plan(
+    graph: PatrolGraph, walks: Sequence[Round], sizes: tuple[int, ...], paces: tuple[float, ...]
+) -> Plan:
     worst, mean = np.empty((len(walks), len(graph))), np.empty((len(walks), len(graph)))
     for group, walk in enumerate(walks):
         visit_gaps(walk.stops, walk.at_m, walk.length_m, sizes[group], worst[group], mean[group])
-    return Plan(tuple(walks), sizes, *map(float, promised(worst, mean, np.array(sizes), 0.0)))
+    slower = np.array(paces)[:, None]
+    worst, mean = worst / slower, mean / slower
+    return Plan(tuple(walks), sizes, paces, *map(float, promised(worst, mean, np.array(sizes), 0.0)))
 
 
 def _near(graph: PatrolGraph) -> IntArray:
@@ -183,11 +235,11 @@ def _near(graph: PatrolGraph) -> IntArray:
     return np.argsort(graph.shortest_m, axis=1, kind="stable")[:, 1 : 1 + NEIGHBOURS]
 
 
-def _cut(graph: PatrolGraph, order: IntArray, sizes: tuple[int, ...]) -> list[set[int]]:
-    """Pieces of a tour, lengths in the ratio of the sizes, each of one vertex at least."""
+def _cut(graph: PatrolGraph, order: IntArray, strengths: tuple[float, ...]) -> list[set[int]]:
+    """Pieces of a tour, lengths in the ratio of the strengths, each of one vertex at least."""
     legs = graph.shortest_m[order[:-1], order[1:]]
     along = np.concatenate([[0.0], np.cumsum(legs)]) / max(float(legs.sum()), 1e-9)
-    ends = np.cumsum(sizes)[:-1] / sum(sizes)
+    ends = np.cumsum(strengths)[:-1] / sum(strengths)
     cuts: list[int] = []
     for k, end in enumerate(ends):
         least = (cuts[-1] if cuts else 0) + 1
@@ -199,9 +251,9 @@ def _cut(graph: PatrolGraph, order: IntArray, sizes: tuple[int, ...]) -> list[se
 class _Levelling:
     """Moves vertices between shares, and swaps them, while that lowers the cost."""
 
-    def __init__(self, graph: PatrolGraph, sizes: tuple[int, ...]) -> None:
+    def __init__(self, graph: PatrolGraph, strengths: tuple[float, ...]) -> None:
         # A copy: the graph's may not be written to, and kernels of tours are compiled apart for such.
-        self._costs_m, self._sizes = np.array(graph.shortest_m), np.array(sizes)
+        self._costs_m, self._strengths = np.array(graph.shortest_m), np.array(strengths)
         self._near = _near(graph)
 
     def run(self, shares: list[set[int]]) -> float:
@@ -210,7 +262,7 @@ class _Levelling:
         lengths = np.array([self._length(order) for order in orders])
         for _ in range(MOST_STEPS):
             # Only the longest need give something away.
-            one = int(np.argmax(lengths / self._sizes))
+            one = int(np.argmax(lengths / self._strengths))
             best = float(self._cost(lengths)) * (1.0 - 1e-6)
             found: tuple[int, IntArray, IntArray] | None = None
             for other, gone, come in self._promising(one, orders, lengths):
@@ -266,7 +318,7 @@ class _Levelling:
 
     def _cost(self, lengths: FloatArray) -> FloatArray:
         """Of lengths (..., G): the longest of a robot's walks, but shorter ones count a little."""
-        each = lengths / self._sizes
+        each = lengths / self._strengths
         longest = np.maximum(each.max(axis=-1), 1e-9)
         return np.asarray(
             longest * ((each / longest[..., None]) ** SOFT_MAX).sum(axis=-1) ** (1.0 / SOFT_MAX)

@@ -42,6 +42,8 @@ class PatrolSetting:
         Who is so near to a vertex visits it.
     talks
         Whether any two robots of the team could hear each other, by their data sheets.
+    speeds_m_s
+        (N,) of all robots as ``speed_m_s`` is this one's; None: they are as fast as this one.
     """
 
     graph: PatrolGraph
@@ -55,6 +57,14 @@ class PatrolSetting:
     turn_m: float = 0.0
     visit_m: float = 0.0
     talks: bool = True
+    speeds_m_s: FloatArray | None = None
+
+    @property
+    def paces(self) -> FloatArray:
+        """(N,) speeds of all robots as a share of the fastest one's."""
+        if self.speeds_m_s is None:
+            return np.ones(self.team_size)
+        return np.asarray(self.speeds_m_s / self.speeds_m_s.max())
 
     @property
     def team_size(self) -> int:

@@ -95,6 +95,8 @@ class PatrolTask:
         Its number.
     strategy
         Who says where to go next.
+    radii_m
+        (N,) of the discs around all robots.
     supply
         None where it never has to charge.
     """
@@ -105,7 +107,14 @@ class PatrolTask:
     starts: IntArray
     robot: int
     strategy: Strategy
+    radii_m: tuple[float, ...]
     supply: Supply | None = None
+
+    @property
+    def widest_mate_m(self) -> float:
+        """Radius of the widest of the others; its own where it is alone."""
+        others = self.radii_m[: self.robot] + self.radii_m[self.robot + 1 :]
+        return max(others or self.radii_m)
 
     @property
     def places(self) -> PatrolPlaces:

@@ -12,11 +12,10 @@ from pilotage.models.motion.motion import MotionConfig
 from pilotage.stack.navigator.patrol.gate import NO_GATE, gate_at
 from pilotage.stack.navigator.patrol.onward import Onward
 from pilotage.stack.navigator.patrol.passage import CLAIM_M
-from pilotage.stack.navigator.patrol.senses import NO_DISCS, NO_POINTS, Senses
+from pilotage.stack.navigator.patrol.senses import LATENCY_S, NO_DISCS, NO_POINTS, Senses
 from pilotage.stack.navigator.patrol.still import StillWatch
 from pilotage.stack.patrol.roadmap import Roadmap
 
-LATENCY_S = 0.05
 ROUNDED_M = 0.03
 """Paths between nodes come nearer than these, and bodies are seen a little elsewhere."""
 DETOUR_SLACK_S = 1.0
@@ -34,6 +33,8 @@ TALKS_PERIODS = 3.0
 """A body is that of a mate who said so lately that it is there."""
 AS_ONE = np.array([1.0, 1j])
 """A place as one number, for finding returns among others."""
+SLOWED = 1.0, 0.5, 0.25, 0.125, 0.0
+"""Shares of a speed that are tried; who rolls yet may have no room to turn meanwhile."""
 PEOPLE_M_S = 1.4
 """Who is no mate may come on at a walk, and gives way to nobody."""
 
@@ -263,8 +264,9 @@ class Motion:
         senses = self._senses
         if not senses.fresh:
             return self.command
-        v, now = command.v_m_s, senses.twist
-        for _ in range(4):
+        now = senses.twist
+        for share in SLOWED:
+            v = share * command.v_m_s
             if safe_stop.stop_is_clear(
                 now.v_m_s,
                 now.w_rad_s,
@@ -276,17 +278,27 @@ class Motion:
                 senses.pose.as_array(),
                 senses.field(lost=True),
             ):
-                break
-            v *= 0.5
-        else:
-            v = 0.0
-        self.command = Twist(v, command.w_rad_s)
-        return self.command
+                self.command = Twist(v, command.w_rad_s)
+                return self.command
+        return self.stand(lost=True)
 
-    def stand(self) -> Twist:
-        """Stop."""
-        self.command = STOP
-        return STOP
+    def stand(self, *, lost: bool = False) -> Twist:
+        """Stop; straight on unless that leads into something."""
+        senses = self._senses
+        if senses.at_rest:
+            self.command = STOP
+        elif senses.fresh or self.command.v_m_s != 0.0:
+            w = safe_stop.braking_turn(
+                senses.twist.v_m_s,
+                senses.twist.w_rad_s,
+                self._limits,
+                self._safety,
+                (senses.near, senses.strange, self._give_way_to_nobody()),
+                senses.pose.as_array(),
+                senses.field(lost=lost),
+            )
+            self.command = Twist(0.0, w)
+        return self.command
 
 
 def is_near(points_m: FloatArray, reach_m: float) -> bool:

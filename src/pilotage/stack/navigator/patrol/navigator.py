@@ -19,10 +19,9 @@ from pilotage.stack.localization.localizer import Abilities
 from pilotage.stack.navigator.navigator import Parts, localizer_of
 from pilotage.stack.navigator.patrol.config import PatrolNavigatorConfig
 from pilotage.stack.navigator.patrol.context import Context
-from pilotage.stack.navigator.patrol.motion import LATENCY_S
 from pilotage.stack.navigator.patrol.paths import roadmap_for
 from pilotage.stack.navigator.patrol.precedence import Leading, precedence
-from pilotage.stack.navigator.patrol.senses import SIGMAS
+from pilotage.stack.navigator.patrol.senses import SIGMAS, stop_m
 from pilotage.stack.navigator.patrol.states import transitions
 from pilotage.stack.navigator.patrol.states.charging import Charging
 from pilotage.stack.navigator.patrol.states.driving import Waiting
@@ -81,7 +80,7 @@ class PatrolNavigator:
         if not able.on_map:
             _check_start(task.initial, parts.patrol)
         if len(parts.patrol.starts) > 1:
-            _check_beams(config, robot)
+            _check_beams(config, robot, min(parts.patrol.radii_m))
         self._tell_mates = able.tell_mates
         self._telemetry = journal.channel(COLUMNS, first=True)
         journal.counts |= {"gave_way": 0, "alarms": 0}
@@ -166,17 +165,15 @@ def _check_start(start: Belief, task: PatrolTask) -> None:
         )
 
 
-def _check_beams(config: PatrolNavigatorConfig, robot: RobotKnowledge) -> None:
-    """Refuse a laser that may show a mate by one beam alone, which may be dust, where both still can stop."""
+def _check_beams(config: PatrolNavigatorConfig, robot: RobotKnowledge, mate_m: float) -> None:
+    """Refuse a laser that may show a mate of a radius by one beam alone, which may be dust, where both still
+    can stop."""
     name, lidar = robot.one_sensor(LidarConfig, "navigator 'patrol'")
-    motion, speed_m_s = robot.motion, robot.motion.top_speed_m_s
-    braking_m_s2 = min(motion.braking_m_s2, speed_m_s / robot.dt_s)
-    reacts_s = max(1.0 / lidar.rate_hz, robot.dt_s) + LATENCY_S
-    stop_m = speed_m_s * reacts_s + 0.5 * speed_m_s**2 / braking_m_s2
-    half_rad = math.asin(robot.radius_m / (2.0 * (robot.radius_m + stop_m) + config.gap_m))
+    stops_m = stop_m(robot, max(1.0 / lidar.rate_hz, robot.dt_s))
+    half_rad = math.asin(mate_m / (robot.radius_m + mate_m + 2.0 * stops_m + config.gap_m))
     if lidar.beam_step_rad > half_rad:
         least = math.ceil(lidar.beams * lidar.beam_step_rad / half_rad)
         raise InputError(
             f"robot.sensors.{name}.beams: expected {least} or more, two of which meet a team mate while both "
-            f"can stop from {speed_m_s:g} m/s, found {lidar.beams}"
+            f"can stop from {robot.motion.top_speed_m_s:g} m/s, found {lidar.beams}"
         )

@@ -30,7 +30,9 @@ NO_POINTS: FloatArray = np.zeros((0, 2))
 NO_DISCS: FloatArray = np.zeros((0, 3))
 SECTORS = 72
 NEAR_M = 1.6
-"""Returns beyond this distance from the axle are out of the way of one decision."""
+"""Returns beyond this distance from the axle are out of the way of one decision, of a robot that stops in
+less."""
+LATENCY_S = 0.05
 SIGMAS = 3.0
 TOLD_M, FAILED_M = 0.2, 0.35
 """What a mate may be wrong about its place by, and how far off a body is seen besides."""
@@ -67,7 +69,7 @@ class Senses:
     radius_m, speed_m_s
         Its own, at most.
     pass_m
-        Half the width of what has room for two.
+        Half the width of what has room for itself and any of its mates.
     talk_habit
         How it talks itself.
     """
@@ -83,7 +85,7 @@ class Senses:
     ) -> None:
         self.config, self.task, self.journal = config, task, journal
         self.dt_s, self.radius_m, self.speed_m_s = robot.dt_s, robot.radius_m, robot.motion.top_speed_m_s
-        self.pass_m = 2.0 * self.radius_m + config.plan_margin_m + 0.5 * config.gap_m + SWAY_M
+        self.pass_m = self.radius_m + task.widest_mate_m + config.plan_margin_m + 0.5 * config.gap_m + SWAY_M
         self._lidar, lidar = robot.one_sensor(LidarConfig, "navigator 'patrol'")
         self._odometry, _ = robot.one_sensor(WheelOdometryConfig, "navigator 'patrol'")
         radios = robot.sensors_of(RadioConfig)
@@ -99,6 +101,7 @@ class Senses:
         self._mount = np.array([lidar.mount.x_m, lidar.mount.y_m, lidar.mount.theta_rad])
         self._known = chart.wall_field
         self.period_s = max(1.0 / lidar.rate_hz, robot.dt_s)
+        self._near_m = max(NEAR_M, stop_m(robot, self.period_s) + robot.radius_m + config.margin_m)
         self.t_s, self.pose, self.spread_m, self.twist = 0.0, start, 0.0, STOP
         self._moved_s = 0.0
         self.fresh = False
@@ -152,7 +155,7 @@ class Senses:
             self._directions,
             self._mount,
             self.pose.as_array(),
-            NEAR_M,
+            self._near_m,
             self._look_m,
             self.config.tolerance_m + self.spread_m,
             spread_rad,
@@ -270,6 +273,13 @@ class Senses:
     def say(self, kind: str, text: str) -> None:
         """Tell that something happened."""
         self.journal.say(self.t_s, kind, text)
+
+
+def stop_m(robot: RobotKnowledge, period_s: float) -> float:
+    """What a robot needs to stop from its top speed, told so a period after what it stops for is seen."""
+    speed_m_s = robot.motion.top_speed_m_s
+    braking_m_s2 = min(robot.motion.braking_m_s2, speed_m_s / robot.dt_s)
+    return speed_m_s * (period_s + LATENCY_S) + 0.5 * speed_m_s**2 / braking_m_s2
 
 
 def _habit(radio: RadioConfig | None, period_s: float, speed_m_s: float) -> Talk:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -19,7 +19,7 @@ from pilotage.stack.patrol.hearing import Hearing, Patience
 from pilotage.stack.patrol.leg_times import LegTimes
 from pilotage.stack.patrol.looking import Looking
 from pilotage.stack.patrol.messages import NOTHING, PatrolKnowledge, PatrolState
-from pilotage.stack.patrol.partition import Plan, annealed, even_sizes
+from pilotage.stack.patrol.partition import Plan, annealed, groupings
 from pilotage.stack.patrol.shut_paths import NONE_SHUT, OpenGraph, same_side
 from pilotage.stack.patrol.strategy import STRATEGIES, PatrolSetting
 from pilotage.stack.patrol.tours import Round, spread
@@ -64,19 +64,20 @@ class AdaptiveRoundsConfig(Config):
     """Who surely is in reach is given up sooner: as soon as so long a silence by chance is less probable."""
 
 
-def best_plan(setting: PatrolSetting, robots: int, config: AdaptiveRoundsConfig) -> Plan:
-    """The plan for so many robots that is forecast to be best: one round for all, one for each, or between.
+def best_plan(setting: PatrolSetting, paces: Sequence[float], config: AdaptiveRoundsConfig) -> Plan:
+    """The plan for robots of paces (N,) that is forecast to be best: one round for all, for each, or between.
 
     Of every number of rounds those that are shortest, and those that turn back least for that.
     """
-    graph = setting.graph
+    graph, robots = setting.graph, len(paces)
     most = min(robots, len(graph))
     # What lies between is much alike: a few numbers of groups stand for all.
     numbers = {1, 2, 3, robots // 2, robots - 1, robots, most}
     plans = [
-        annealed(graph, even_sizes(robots, groups), config.mean_weight, config.sharing_cost, turn_m)
+        annealed(graph, sizes, config.mean_weight, config.sharing_cost, turn_m, slowest)
         for groups in sorted(numbers)
         if 1 <= groups <= most
+        for sizes, slowest in sorted(groupings(paces, groups), reverse=True)
         for turn_m in sorted({0.0, setting.turn_m})
     ]
     driving = Driving(
@@ -115,18 +116,21 @@ class AdaptiveRoundsStrategy:
 
     def __init__(self, config: AdaptiveRoundsConfig, setting: PatrolSetting) -> None:
         self._config, self._setting, self._graph = config, setting, setting.graph
-        team = setting.team_size
+        team, self._paces = setting.team_size, setting.paces
         self._tight = setting.passages.vertices_in(config.beside_passage_m)
         self._side, self._shut = frozenset(range(team)), NONE_SHUT
         self._away_m = self._graph.shortest_m
-        self._plan = best_plan(setting, team, config)
+        self._plan = best_plan(setting, self._paces.tolist(), config)
         from_starts_m = (
             self._graph.shortest_m[setting.starts] if setting.starts_m is None else setting.starts_m
         )
         groups = self._seats(dict(enumerate(from_starts_m)))
         self._round = self._plan.rounds[groups[setting.robot]]
         mates = [robot for robot in sorted(groups) if groups[robot] == groups[setting.robot]]
-        slots = spread(self._round, self._graph, setting.starts[mates], setting.speed_m_s, setting.begin_s)
+        # Those who share a round reckon with the slowest one's speed.
+        slowed = self._plan.paces[groups[setting.robot]] / float(self._paces[setting.robot])
+        speed_m_s = setting.speed_m_s * slowed
+        slots = spread(self._round, self._graph, setting.starts[mates], speed_m_s, setting.begin_s)
         slot = slots[mates.index(setting.robot)]
         self._legs, self._left_s = LegTimes(self._round), math.nan
         self._place = slot.place
@@ -232,7 +236,7 @@ class AdaptiveRoundsStrategy:
         setting, side = self._setting, sorted(self._side)
         left = OpenGraph.of(setting.graph, setting.passages, self._shut)
         there = replace(setting, graph=left.graph, passages=left.passages)
-        self._plan = left.whole(best_plan(there, len(side), self._config))
+        self._plan = left.whole(best_plan(there, self._paces[side].tolist(), self._config))
         self._away_m = left.away_m(self._graph)
         places = {robot: self._place_of(knowledge, robot) for robot in side}
         groups = self._seats({robot: self._away_m[at] for robot, at in places.items()})
@@ -242,10 +246,12 @@ class AdaptiveRoundsStrategy:
         """Which group each robot belongs to, by its distances to all vertices (V,).
 
         The least sum of squared distances to the rounds: along a passage for one nobody is sent past another.
+        Nobody goes a round that is planned for faster ones.
         """
         plan, robots = self._plan, sorted(away_m)
         seats = np.repeat(np.arange(len(plan.sizes)), plan.sizes)
         away = np.array([[away_m[r][walk.stops].min() for walk in plan.rounds] for r in robots])
+        away[self._paces[robots][:, None] < np.array(plan.paces)] = math.inf
         row, column = scipy.optimize.linear_sum_assignment(away[:, seats] ** 2)
         return {robots[r]: int(seats[c]) for r, c in zip(row, column, strict=True)}
 
@@ -271,7 +277,8 @@ class AdaptiveRoundsStrategy:
         self._place = int(np.argmin(to_m)) if shared else _oldest_first(walk, to_m, idle_m)
 
     def _change_rounds(self, knowledge: PatrolKnowledge) -> None:
-        """Leave a round that has too many for one that has too few, if nobody else of it is nearer."""
+        """Leave a round that has too many for one that has too few, if nobody else of it is nearer, or fast
+        enough where it is not itself."""
         plan, keys = self._plan, [_key(walk) for walk in self._plan.rounds]
         if len(keys) == 1:
             return
@@ -283,12 +290,12 @@ class AdaptiveRoundsStrategy:
         own = _key(self._round)
         if len(on[own]) + 1 <= plan.sizes[keys.index(own)]:
             return
-        for key, walk, size in zip(keys, plan.rounds, plan.sizes, strict=True):
+        for key, walk, size, pace in zip(keys, plan.rounds, plan.sizes, plan.paces, strict=True):
             if key == own or len(on[key]) >= size:
                 continue
-            away = self._away_m[:, walk.stops].min(axis=1)
-            mine = float(away[knowledge.at]), knowledge.robot
-            if all(mine < (float(away[state.target]), state.robot) for state in on[own]):
+            away, is_slow = self._away_m[:, walk.stops].min(axis=1), self._paces < pace
+            mine = is_slow[knowledge.robot], float(away[knowledge.at]), knowledge.robot
+            if all(mine < (is_slow[s.robot], float(away[s.target]), s.robot) for s in on[own]):
                 self._join(walk, knowledge)
                 return
 
