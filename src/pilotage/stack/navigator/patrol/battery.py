@@ -12,6 +12,8 @@ from pilotage.stack.patrol.task import Supply
 
 DOCK_M = 0.5
 """So near to its station it stands and charges."""
+SHORT_SHARE = 0.5
+"""Of the reserve, the rest of which is for making room for others on its way to the station."""
 SURE_S = 1.0
 """It stands for so much longer than the battery takes: it may come to rest later than its odometry says."""
 
@@ -60,7 +62,16 @@ class Battery:
         self.left_m, self.low = self._supply.range_m, False
 
     def check(self, pose: Pose2) -> bool:
-        """Whether it is time to go and charge; ``low`` from then on.
+        """Whether it is time to go and charge; ``low`` from then on."""
+        self.low = self._spare_m(pose) <= self._supply.reserve_m
+        return self.low
+
+    def is_short(self, pose: Pose2) -> bool:
+        """Whether it is low and little of the reserve is left: enough for the path to the station alone."""
+        return self.low and self._spare_m(pose) <= SHORT_SHARE * self._supply.reserve_m
+
+    def _spare_m(self, pose: Pose2) -> float:
+        """What is left beyond the path to the station.
 
         The time to go is longer than the path over the speed wherever walls are near: no path is longer than
         what it says.
@@ -69,6 +80,4 @@ class Battery:
         time = roadmap.time_s(self.station)
         to_go_s = eikonal.value_at(pose.x_m, pose.y_m, time, *roadmap.origin_xy_m, roadmap.spacing_m, 0.0)
         # Where the map has no floor the pose is a little off: the next one tells.
-        needed_m = to_go_s * self._speed_m_s if to_go_s < math.inf else 0.0
-        self.low = self.left_m <= needed_m + self._supply.reserve_m
-        return self.low
+        return self.left_m - (to_go_s * self._speed_m_s if to_go_s < math.inf else 0.0)

@@ -141,6 +141,10 @@ class Context(Paths):
         """Whether it is on its way to its station."""
         return self.battery is not None and self.battery.low
 
+    def must_go_home(self) -> bool:
+        """Whether it would not reach its station if it drove anywhere else."""
+        return self.battery is not None and self.battery.is_short(self.pose)
+
     def arrived(self, *, blocked: bool) -> bool:
         """Whether it is near enough to where it drives to; what blocks a vertex may be there in its place."""
         if self.homeward:

@@ -25,7 +25,7 @@ class Yielding:
         del readings
         context = self.context
         context.mode = Mode.YIELD
-        if context.t_s >= self.until_s or context.runs_low():
+        if context.t_s >= self.until_s or context.runs_low() or context.must_go_home():
             return to.resume(context)
         if context.away_m(self.vertex) <= 0.5 * context.task.visit_m:
             context.visit(self.vertex)
@@ -53,7 +53,9 @@ class SteppingAside:
         del readings
         context = self.context
         context.mode = Mode.YIELD
-        if context.t_s >= self.until_s or context.runs_low() or not context.has(self.time):
+        if context.t_s >= self.until_s or not context.has(self.time):
+            return to.resume(context)
+        if context.runs_low() or context.must_go_home():
             return to.resume(context)
         if context.fresh:
             traffic.look_along(context, context.here())

@@ -94,8 +94,10 @@ def give_way(context: Context) -> Move:
     """Drive to a vertex near by, away from what is in the way; wait a little where there is none.
 
     Among several who stand around, or where no vertex is, to where nobody stands: vertices may all lie
-    beyond them.
+    beyond them. Who would not reach its charging station from anywhere else stands: the others make room.
     """
+    if context.must_go_home():
+        return wait(context)
     until_s = context.t_s + context.config.yield_s * (0.5 + float(context.rng.random()))
     field, vertex = traffic.free_place(context, traffic.SEVERAL), -1
     if field is None:
