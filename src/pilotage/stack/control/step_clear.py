@@ -39,11 +39,8 @@ class StepClear:
     def __init__(self, robot: RobotKnowledge, last_word: LastWord) -> None:
         self._last_word, self._footprint = last_word, robot.footprint
         speed = min(SPEED_M_S, robot.motion.top_speed_m_s)
-        turn, radius_m = (
-            min(TURN_RAD_S, robot.motion.top_turn_rate_rad_s),
-            robot.motion.least_turning_radius_m,
-        )
-        turn = turn if radius_m == 0.0 else min(turn, speed / radius_m)
+        turn, radius_m = TURN_RAD_S, robot.motion.least_turning_radius_m
+        turn = min(turn, robot.motion.top_turn_rate_rad_s, speed / radius_m if radius_m > 0.0 else turn)
         sees_behind = any(looks_back(sheet) for sheet in robot.sensors_of(LidarConfig).values())
         speeds = (speed, -speed) if sees_behind else (speed,)
         self._steps = [Twist(v, share * turn) for v in speeds for share in (0.0, 0.5, -0.5, 1.0, -1.0)]

@@ -1,4 +1,4 @@
-"""What a state of a navigator is, what a step in one comes to, and the last one."""
+"""What navigators that are state machines share: their states, and what they show of themselves."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ from typing import NamedTuple, Protocol
 
 from pilotage.core.types import STOP, Twist
 from pilotage.sensors.readings import Readings
-from pilotage.stack.interface import Belief
+from pilotage.stack.interface import Belief, StackStatus
+from pilotage.stack.journal import Journal
+from pilotage.stack.localization.localizer import Localizer
 
 
 class State(Protocol):
@@ -31,3 +33,33 @@ class Ended:
     def step(self, readings: Readings, belief: Belief) -> Move:  # noqa: ARG002 - nothing matters any more
         """Stay."""
         return Move(self, STOP)
+
+
+class Standing:
+    """How the task stands as the robot sees it, and why: part of what its states share."""
+
+    def __init__(self, journal: Journal) -> None:
+        self.journal = journal
+        self.status, self.reason = StackStatus.RUNNING, ""
+
+    def end(self, t_s: float, status: StackStatus, why: str) -> None:
+        """Arrive or fail, and say so."""
+        self.status, self.reason = status, why
+        self.journal.say(t_s, str(status), why)
+
+
+class StateMachine:
+    """What such a navigator shows of itself: its localizer's belief, and how the task stands."""
+
+    def __init__(self, localizer: Localizer, standing: Standing) -> None:
+        self._localizer, self._standing = localizer, standing
+
+    @property
+    def belief(self) -> Belief:
+        """The localizer's belief."""
+        return self._localizer.belief
+
+    @property
+    def status(self) -> tuple[StackStatus, str]:
+        """Running, arrived or failed, and why."""
+        return self._standing.status, self._standing.reason

@@ -6,7 +6,7 @@ import numpy as np
 
 from pilotage.core.types import FloatArray
 from pilotage.stack.exploration.floor_frontiers import SeenFloor
-from pilotage.stack.interface import Belief, BeliefStatus, StackStatus
+from pilotage.stack.interface import Belief, BeliefStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.localization.localizer import Abilities, Localizer
 from pilotage.stack.navigator.floor_explorer.config import FloorExplorerConfig
@@ -14,6 +14,7 @@ from pilotage.stack.navigator.floor_explorer.getting_on import STALL_M, GettingO
 from pilotage.stack.navigator.floor_explorer.own_floor import OwnFloor
 from pilotage.stack.navigator.floor_explorer.targets import Targets
 from pilotage.stack.navigator.progress import patience_s
+from pilotage.stack.navigator.state import Standing
 
 AHEAD_M = 2.5
 """The local controller is led by a point so far ahead on the path."""
@@ -22,7 +23,7 @@ SHY_SHARE = 1.0 / 3.0
 line with room leads to, not by one around a corner, straight to which a gap may be too narrow for it."""
 
 
-class Context:
+class Context(Standing):
     """The parts that the states decide by, and what is remembered from one decision to the next.
 
     Attributes
@@ -37,8 +38,6 @@ class Context:
         Places that it went back to as it was lost; checks that it stands where it began.
     sure_m
         What it is unsure by at a place that it knows best: that cannot be helped.
-    status, reason
-        How the task stands, and why.
     """
 
     def __init__(
@@ -50,8 +49,9 @@ class Context:
         top_speed_m_s: float,
         journal: Journal,
     ) -> None:
+        super().__init__(journal)
         self.config, self.own, self.targets = config, own, targets
-        self.localizer, self.able, self.journal = localizer, Abilities.of(localizer), journal
+        self.localizer, self.able = localizer, Abilities.of(localizer)
         # A frontier no longer than the robot is wide is one that a small robot fits through.
         self.least_m = min(config.least_frontier_m, 2.0 * own.clearance_m)
         self.getting_on = GettingOn(own.start_m, top_speed_m_s)
@@ -60,12 +60,6 @@ class Context:
         self.seen: SeenFloor | None = None
         self.frontiers, self.squeezes = 0, False
         self.searched, self.checked, self.sure_m = 0, 0, 0.0
-        self.status, self.reason = StackStatus.RUNNING, ""
-
-    def end(self, t_s: float, status: StackStatus, why: str) -> None:
-        """Arrive or fail, and say so."""
-        self.status, self.reason = status, why
-        self.journal.say(t_s, str(status), why)
 
     def is_unsure(self, belief: Belief) -> bool:
         """Whether to close a loop first."""

@@ -26,13 +26,14 @@ from pilotage.stack.navigator.floor_explorer.own_floor import OwnFloor
 from pilotage.stack.navigator.floor_explorer.states import Exploring, State
 from pilotage.stack.navigator.floor_explorer.targets import Targets
 from pilotage.stack.navigator.navigator import Parts, localizer_of
+from pilotage.stack.navigator.state import StateMachine
 
 COUNTS = ("frontiers_seen", "frontiers_left", "frontiers_given_up", "loops_sought")
 COLUMNS = {"goal_x_m": "m", "goal_y_m": "m", "frontiers": "1", "position_std_m": "m"}
 
 
 @NAVIGATORS.add("floor-frontier", FloorExplorerConfig)
-class FloorExplorer:
+class FloorExplorer(StateMachine):
     """Explores a floor with a laser scanner until no frontier is left that it can look at.
 
     Goes to the nearest frontier (Yamauchi, 1997), long ones a little sooner; paths are planned over seen free
@@ -65,7 +66,7 @@ class FloorExplorer:
         del chart  # it knows nothing of the floor
         if parts.local_controller is None:
             raise InputError("navigator 'floor-frontier': expected stack.local_controller, found none")
-        self._localizer = localizer_of(parts, "floor-frontier")
+        localizer = localizer_of(parts, "floor-frontier")
         self._lidar, scanner = robot.one_sensor(LidarConfig, "navigator 'floor-frontier'")
         start = task.initial.pose
         self._drive = LocalDrive(
@@ -77,25 +78,16 @@ class FloorExplorer:
         )
         self._last_word = LastWord(robot)
         self._step_clear = StepClear(robot, self._last_word)
-        scans = Abilities.of(self._localizer).scan_grid
+        scans = Abilities.of(localizer).scan_grid
         self._own = OwnFloor(config, scanner, scans, np.array([start.x_m, start.y_m]), robot.radius_m)
         targets, top_speed_m_s = Targets(config, scanner.max_range_m), robot.motion.top_speed_m_s
-        self._context = Context(config, self._own, targets, self._localizer, top_speed_m_s, journal)
+        self._context = Context(config, self._own, targets, localizer, top_speed_m_s, journal)
+        super().__init__(localizer, self._context)
         self._state: State = Exploring()
         self._decided_s = -math.inf
         journal.result("grid", self._own.left)
         journal.counts |= dict.fromkeys(COUNTS, 0)
         self._channel = journal.channel(COLUMNS, first=True)
-
-    @property
-    def belief(self) -> Belief:
-        """The localizer's belief."""
-        return self._localizer.belief
-
-    @property
-    def status(self) -> tuple[StackStatus, str]:
-        """How the task stands as the robot sees it, and why."""
-        return self._context.status, self._context.reason
 
     def step(self, readings: Readings) -> Twist:
         """Localize, look whether there is something better to do, and drive."""

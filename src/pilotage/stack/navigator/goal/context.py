@@ -16,7 +16,7 @@ from pilotage.stack.control.guard import ArcGuard
 from pilotage.stack.control.last_word import LastWord
 from pilotage.stack.control.make_room import MakeRoom
 from pilotage.stack.control.reactive import Reaction, ReactionKind
-from pilotage.stack.interface import Belief, StackStatus
+from pilotage.stack.interface import Belief
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.navigator.following import WaypointFollower
@@ -32,6 +32,7 @@ from pilotage.stack.navigator.navigator import (
 )
 from pilotage.stack.navigator.own_map import OwnMap
 from pilotage.stack.navigator.progress import PathProgress, StallWatch, patience_s
+from pilotage.stack.navigator.state import Standing
 from pilotage.stack.navigator.wandering import Wandering
 from pilotage.stack.perception.moving_bodies import MovingBodies
 from pilotage.stack.planning.local_planner import LocalPlanner
@@ -55,7 +56,7 @@ SOMEBODY_M = 2.0
 NO_REACTION = Reaction(ReactionKind.NONE, 0.0, math.inf, math.inf)
 
 
-class Context:
+class Context(Standing):
     """The parts that the states drive with, the questions that they ask, and what the record wants to know.
 
     Attributes
@@ -64,8 +65,8 @@ class Context:
         Who moves about, and what else no map that it was told explains.
     turn_rate_rad_s
         On the spot.
-    t_s, status, reason
-        Of the last step; why the task failed.
+    t_s
+        Of the last step.
     mode, reaction, to_go_m
         What is recorded of the last step.
     goals
@@ -90,9 +91,9 @@ class Context:
         controller: Controller,
         journal: Journal,
     ) -> None:
+        super().__init__(journal)
         self.config = config
         self.radius_m, self.is_disc = robot.radius_m, robot.footprint.is_disc
-        self.journal = journal
         self.goals: list[Goal] = list(task.goals)
         self._task, self._tolerance_m = task, task.goal_tolerance_m
         self._arrival_m = min(config.arrival_m, arrival_within_m(None, task.goal_tolerance_m))
@@ -124,7 +125,6 @@ class Context:
             progress_m, patience_s(config.stall_s, progress_m, robot.motion.top_speed_m_s)
         )
         self.t_s = 0.0
-        self.status, self.reason = StackStatus.RUNNING, ""
         self.mode, self.reaction, self.to_go_m = Mode.FOLLOW, NO_REACTION, math.nan
         self.trail: list[Pose2] = []
 

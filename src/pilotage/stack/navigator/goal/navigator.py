@@ -8,7 +8,7 @@ from pilotage.core.errors import InputError
 from pilotage.core.types import Twist
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.readings import Readings
-from pilotage.stack.interface import NAVIGATORS, Belief, BeliefStatus, StackStatus
+from pilotage.stack.interface import NAVIGATORS, BeliefStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.mapping.mapper import Mapper
@@ -18,7 +18,7 @@ from pilotage.stack.navigator.goal.finding import Lost, first_state, lose
 from pilotage.stack.navigator.goal_config import GoalNavigatorConfig
 from pilotage.stack.navigator.navigator import Parts, check_for_centre, localizer_of
 from pilotage.stack.navigator.own_map import OwnMap
-from pilotage.stack.navigator.state import Ended, State
+from pilotage.stack.navigator.state import Ended, State, StateMachine
 from pilotage.stack.perception.moving_bodies import MovingBodies
 
 COLUMNS = {
@@ -37,7 +37,7 @@ COLUMNS = {
 
 
 @NAVIGATORS.add("goal", GoalNavigatorConfig)
-class GoalNavigator:
+class GoalNavigator(StateMachine):
     """Drives to one goal or to several in order (night-watch report, chapter 4: its loop).
 
     Plans globally before the start; then at every step localizes, maps what is unexpected, follows the
@@ -69,7 +69,7 @@ class GoalNavigator:
                 f"found no {' and no '.join(f'stack.{role}' for role in missing)}"
             )
         check_for_centre(parts, "goal")
-        self._localizer = localizer_of(parts, "goal")
+        localizer = localizer_of(parts, "goal")
         self._telemetry = journal.channel(COLUMNS, first=True)
         own_map = OwnMap(chart, parts.mapper)
         journal.result("mapped_circles_m", lambda: own_map.found_circles_m)
@@ -83,18 +83,9 @@ class GoalNavigator:
         self._context = Context(
             config, robot, task, parts, own_map, plan, parts.local_planner, parts.controller, journal
         )
+        super().__init__(localizer, self._context)
         self._state: State = first_state(self._context, self.belief)
         self._unseen = MatesUnseen(task.mates, parts.mapper, self._context.bodies, journal)
-
-    @property
-    def belief(self) -> Belief:
-        """The localizer's belief."""
-        return self._localizer.belief
-
-    @property
-    def status(self) -> tuple[StackStatus, str]:
-        """Running, arrived or failed, and why."""
-        return self._context.status, self._context.reason
 
     def step(self, readings: Readings) -> Twist:
         """One control step."""

@@ -11,7 +11,7 @@ from pilotage.stack.control.give_way import GiveWay
 from pilotage.stack.control.last_word import LastWord
 from pilotage.stack.control.own_half import OwnHalf
 from pilotage.stack.control.step_clear import StepClear
-from pilotage.stack.interface import Belief, StackStatus
+from pilotage.stack.interface import Belief
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.navigator.global_plan import GlobalPlan
@@ -21,6 +21,7 @@ from pilotage.stack.navigator.maneuver.tracking import Tracking
 from pilotage.stack.navigator.navigator import Parts, localizer_of, unexplained_of
 from pilotage.stack.navigator.own_map import OwnMap
 from pilotage.stack.navigator.reference import STANDS
+from pilotage.stack.navigator.state import Standing
 from pilotage.stack.navigator.trail import Trail
 from pilotage.stack.navigator.wandering import Wandering
 from pilotage.stack.navigator.yielding import Yielding
@@ -41,13 +42,11 @@ COLUMNS = {"ref_x_m": "m", "ref_y_m": "m", "ref_theta_rad": "rad", "distance_to_
 """Where the reference is, and how much of the path is left."""
 
 
-class Context:
+class Context(Standing):
     """The parts that the states drive with, and the questions that they ask.
 
     Attributes
     ----------
-    status, reason
-        How the task stands, and why it failed.
     yielding, stops
         What came of waiting, and of walls where none should be, since nothing led back to where it was.
     trail
@@ -69,8 +68,9 @@ class Context:
         planner: Planner,
         journal: Journal,
     ) -> None:
+        super().__init__(journal)
         self._channel = journal.channel(COLUMNS, first=True)
-        self.config, self.journal, self._robot, self._goal = config, journal, robot, goal
+        self.config, self._robot, self._goal = config, robot, goal
         self.dt_s = robot.dt_s
         self._mapper, self.has_mates = parts.mapper, task.mates > 0
         self.own_map = OwnMap(chart, parts.mapper)
@@ -88,15 +88,9 @@ class Context:
         self.last_word = LastWord(robot)
         self.step_clear = StepClear(robot, self.last_word)
         self.wandering = Wandering(config.wander, robot, localizer_of(parts, "maneuver"), self.last_word)
-        self.status, self.reason = StackStatus.RUNNING, ""
         self.trail: Trail | None = None
         self.replans, self.rests, self.has_planned = 0, 0, False
         self._to_walls_m = 0.0
-
-    def end(self, t_s: float, status: StackStatus, why: str) -> None:
-        """Arrive or fail, and say so."""
-        self.status, self.reason = status, "" if status is StackStatus.ARRIVED else why
-        self.journal.say(t_s, str(status), why)
 
     def begin_anew(self) -> None:
         """Nothing leads back to where it was."""

@@ -6,18 +6,18 @@ from pilotage.core.errors import InputError
 from pilotage.core.types import Twist
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.readings import Readings
-from pilotage.stack.interface import NAVIGATORS, Belief, BeliefStatus, StackStatus
+from pilotage.stack.interface import NAVIGATORS, BeliefStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.navigator.maneuver.config import ManeuverConfig
 from pilotage.stack.navigator.maneuver.context import Context
 from pilotage.stack.navigator.maneuver.states import Lost, first_state
 from pilotage.stack.navigator.navigator import Parts, check_keeps_time, localizer_of, missing, only_goal
-from pilotage.stack.navigator.state import Ended
+from pilotage.stack.navigator.state import Ended, StateMachine
 
 
 @NAVIGATORS.add("maneuver", ManeuverConfig)
-class ManeuverNavigator:
+class ManeuverNavigator(StateMachine):
     """Follows a plan with its changes of direction by a speed profile; the plan is made on the true outline.
 
     A robot that turns on the spot does so at the path's corners, so that it drives the very lines of a sweep.
@@ -44,23 +44,14 @@ class ManeuverNavigator:
         if goal is None or parts.planner is None:
             absent = missing({"world.goal": goal, "stack.planner": parts.planner})
             raise InputError(f"navigator 'maneuver': expected world.goal and stack.planner, found {absent}")
-        self._localizer = localizer_of(parts, "maneuver")
+        localizer = localizer_of(parts, "maneuver")
         check_keeps_time(parts, "maneuver")
         self._context = context = Context(config, robot, chart, task, parts, goal, parts.planner, journal)
+        super().__init__(localizer, context)
         self._state = first_state(context, self.belief)
         if context.plan.hopeless and context.plan.too_tight:
             remedy = "take rrt-star-dubins, or stack.smoother: shortcut"
             raise InputError(f"navigator 'maneuver': {context.reason}; or {remedy}")
-
-    @property
-    def belief(self) -> Belief:
-        """The localizer's belief."""
-        return self._localizer.belief
-
-    @property
-    def status(self) -> tuple[StackStatus, str]:
-        """How the task stands as the robot sees it, and why."""
-        return self._context.status, self._context.reason
 
     def step(self, readings: Readings) -> Twist:
         """One control step."""

@@ -254,7 +254,8 @@ def end_of_path(context: Context, state: Driving, t_s: float, belief: Belief) ->
     rest = go_for_the_rest(context, t_s, belief)
     if rest is not None:
         return rest
-    context.end(t_s, StackStatus.ARRIVED, "the plan was driven to its end")
+    context.status = StackStatus.ARRIVED
+    context.journal.say(t_s, "arrived", "the plan was driven to its end")
     return Ended()
 
 
