@@ -27,6 +27,9 @@ from pilotage.sim.bodies.motion import SIMULATED_MOTIONS
 from pilotage.sim.sensing.sensor import SIMULATED_SENSORS
 from support.warm_workers import WarmProcess, warm_context
 
+LONGEST_S = 1800.0
+"""Longer than any command that a test starts takes on the slowest machine."""
+
 
 @dataclass(frozen=True, slots=True)
 class Started:
@@ -57,9 +60,14 @@ class Started:
             time.sleep(0.005)
 
     def ended(self) -> subprocess.CompletedProcess[str]:
-        """Wait for it; the exit code is negative where a signal ended it."""
-        self.process.join()
-        assert self.process.exitcode is not None
+        """Wait for it; the exit code is negative where a signal ended it.
+
+        One that hangs is killed, and told: a suite that waits for it for ever tells nobody anything.
+        """
+        self.process.join(LONGEST_S)
+        if self.process.exitcode is None:
+            self.process.kill()
+            raise AssertionError(f"still running after {LONGEST_S:g} s: {self.err.read_text()[-2000:]}")
         told = (stream.read_text(encoding="utf-8") for stream in (self.out, self.err))
         return subprocess.CompletedProcess((), self.process.exitcode, *told)
 

@@ -8,17 +8,21 @@ import signal
 import subprocess
 import sys
 import time
+import warnings
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Annotated
 
 import pytest
+from pydantic import Discriminator, Tag, TypeAdapter
 
 from pilotage.cli import app
 from pilotage.cli.main import main
-from pilotage.core.interruptions import Terminated, interruptible, interruption_in
+from pilotage.core import interruptions
+from pilotage.core.interruptions import Terminated, answered, ended_by, interruptible, interruption_in
 from support.endless_runs import endless
 from support.warm_commands import start
 
@@ -151,6 +155,10 @@ def test_so_it_does_in_a_script(tmp_path: Path) -> None:
     assert (child.returncode, child.stderr) == (1, "interrupted, 1, True\n")
 
 
+WENT_ON: list[bool] = []
+"""Work that an interruption was to end came to its own end."""
+
+
 def from_a_kernel() -> None:
     """As the interpreter does where a C function returns a result though an exception is set."""
     try:
@@ -193,18 +201,84 @@ def in_a_destructor() -> None:
     del held
     assert kept() is None
     time.sleep(60.0)
+    WENT_ON.append(True)
+
+
+def taken_for_an_answer() -> None:
+    """As pydantic does where it asks which member of a union a value is."""
+
+    def kind(_: object) -> str:
+        os.kill(os.getpid(), signal.SIGTERM)
+        time.sleep(60.0)
+        return "whole"
+
+    member = Annotated[int, Tag("whole")] | Annotated[float, Tag("real")]
+    with warnings.catch_warnings(action="ignore"):
+        TypeAdapter(Annotated[member, Discriminator(kind)]).dump_python(3)
+    time.sleep(60.0)
+    WENT_ON.append(True)
 
 
 @pytest.mark.parametrize(
     ("strike", "code"),
-    [(from_a_kernel, 130), (dropped_by_c, 143), (from_clearing_up, 143), (in_a_destructor, 130)],
+    [
+        (from_a_kernel, 130),
+        (dropped_by_c, 143),
+        (from_clearing_up, 143),
+        (in_a_destructor, 130),
+        (taken_for_an_answer, 143),
+    ],
 )
 def test_an_interruption_in_disguise_is_recognized(
     strike: Callable[[], None], code: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(app, "dispatch", lambda _: strike())
     assert main(["run"]) == code
+    assert not WENT_ON
     assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_what_it_ends_is_not_struck_again(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """However long clearing up takes, and what who answers it does afterwards."""
+    done = []
+
+    @contextmanager
+    def held() -> Iterator[None]:
+        try:
+            yield
+        finally:
+            with suppress(ValueError):
+                try:
+                    raise ValueError
+                finally:
+                    _spend(10 * interruptions._LOST_S)
+                    done.append("cleared")
+
+    def clear(_: object) -> int:
+        try:
+            with held():
+                os.kill(os.getpid(), signal.SIGHUP)
+                time.sleep(60.0)
+        except KeyboardInterrupt as stop:
+            answered()
+            code = ended_by(stop)[1]
+        _spend(10 * interruptions._LOST_S)
+        done.append("told")
+        return code
+
+    monkeypatch.setattr(interruptions, "_LOST_S", 0.02)
+    monkeypatch.setattr(app, "dispatch", clear)
+    assert main(["run"]) == 129
+    assert (done, capsys.readouterr().err) == (["cleared", "told"], "")
+
+
+def _spend(duration_s: float) -> None:
+    """Time in which the interpreter looks for signals again and again."""
+    until = time.monotonic() + duration_s
+    while time.monotonic() < until:
+        time.sleep(0.001)
 
 
 def test_the_chain_of_causes_may_be_a_circle_or_a_group() -> None:
@@ -243,6 +317,16 @@ class TestInterruptible:
             dropped()
         assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
         assert signal.getsignal(signal.SIGALRM) is signal.SIG_DFL
+
+    def test_one_that_was_swallowed_comes_out_at_the_end(self) -> None:
+        @interruptible()
+        def swallowed() -> None:
+            with suppress(KeyboardInterrupt):
+                os.kill(os.getpid(), signal.SIGINT)
+                time.sleep(60.0)
+
+        with pytest.raises(KeyboardInterrupt):
+            swallowed()
 
     def test_other_errors_are_what_they_were(self) -> None:
         with pytest.raises(ZeroDivisionError), interruptible():

@@ -14,7 +14,7 @@ from pilotage.cli.options import Json, Overrides, Plugins, WorkerCount, parse_ou
 from pilotage.cli.output import print_columns, print_json, print_line, stdout_for_json
 from pilotage.cli.study_line import StudyLine
 from pilotage.core.errors import InputError
-from pilotage.core.interruptions import ended_by
+from pilotage.core.interruptions import answered, ended_by
 from pilotage.core.shown import visible
 
 if TYPE_CHECKING:
@@ -200,6 +200,7 @@ def run_study_quietly(loaded: Study, folder: Path, options: StudyOptions, show: 
             line.close()
             page = _write_files(folder, show)
     except KeyboardInterrupt as stop:
+        answered()
         told, code = ended_by(stop)
         return _stopped(line, f"{told.replace('interrupted', 'stopped')}; {go_on}", code)
     except StudyStoppedError as error:

@@ -15,6 +15,10 @@ STRUCK = 128
 ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 """What asks a process to end: Ctrl-C, a supervisor, a terminal that is gone."""
 _SOON_S = 0.01
+_LOST_S = 2.0
+"""So long after an interruption was raised it is on its way, answered, or some library has dropped it."""
+_raised: list[KeyboardInterrupt] = []
+"""What was raised and has not ended anything yet that is known of."""
 _UNGUARDED = tuple(
     str(Path(*names))
     for names in (
@@ -73,13 +77,20 @@ def _is_unguarded(frame: FrameType | None) -> bool:
     return False
 
 
+def answered() -> None:
+    """Said by who catches an interruption and goes on to an end of its own: it is not raised once more."""
+    _raised.clear()
+
+
 @contextmanager
 def never_swallowed() -> Iterator[Callable[[KeyboardInterrupt, FrameType | None], None]]:
-    """Raise an interruption once more where the interpreter could not: in a destructor or a C callback.
+    """Raise an interruption once more where it was lost, and what was to end would go on.
 
-    There it would be printed and forgotten, and what was to end would go on. For a process's main thread.
-    What is yielded raises an interruption that strikes in a frame, a little later where the frame cannot
-    bear it.
+    The interpreter prints and forgets one in a destructor or a C callback; a library may call us back and
+    take whatever is raised for an answer, as pydantic does where it chooses among a union's members. So one
+    that no code is unwinding for after a while, and that nobody has ``answered``, strikes again. For a
+    process's main thread. What is yielded raises an interruption that strikes in a frame, a little later
+    where the frame cannot bear it.
     """
     if not hasattr(signal, "setitimer"):
         yield _raise_at_once
@@ -98,24 +109,37 @@ def never_swallowed() -> Iterator[Callable[[KeyboardInterrupt, FrameType | None]
         signal.setitimer(signal.ITIMER_REAL, _SOON_S)
 
     def raise_in(stop: KeyboardInterrupt, frame: FrameType | None) -> None:
-        if not _is_unguarded(frame):
-            raise stop
-        raise_later(stop)
+        if _is_unguarded(frame):
+            raise_later(stop)
+            return
+        _raised[:] = [stop]
+        signal.setitimer(signal.ITIMER_REAL, _LOST_S, _LOST_S)
+        raise stop
 
     def again(signum: int, frame: FrameType | None) -> None:  # noqa: ARG001 - as signal calls it
         if lost:
             raise_in(lost.pop(), frame)
+        elif _raised and not _is_unwinding():
+            raise_in(_raised[0], frame)
 
     before_hook, before_alarm = sys.unraisablehook, signal.signal(signal.SIGALRM, again)
     sys.unraisablehook = hook
+    _raised.clear()
     try:
         yield raise_in
-        if lost:
-            raise lost.pop()
+        if lost or _raised:
+            raise [*lost, *_raised][0]
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         sys.unraisablehook = before_hook
         signal.signal(signal.SIGALRM, before_alarm)
+        _raised.clear()
+
+
+def _is_unwinding() -> bool:
+    """Whether the code that runs now is an interruption's clearing up."""
+    handled = sys.exception()
+    return handled is not None and interruption_in(handled) is not None
 
 
 def _raise_at_once(stop: KeyboardInterrupt, frame: FrameType | None) -> None:  # noqa: ARG001 - as it is called

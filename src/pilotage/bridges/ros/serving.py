@@ -9,6 +9,7 @@ from typing import Any
 from pilotage.bridges.ros import messages as ros
 from pilotage.bridges.ros.node import FLUSH_S, ros_node
 from pilotage.core.errors import InputError
+from pilotage.core.interruptions import answered
 from pilotage.core.misfit import unfit_number
 from pilotage.core.types import STOP, Pose2, Twist
 from pilotage.experiments.build.robots import sensors_of
@@ -97,7 +98,7 @@ def serve(mission: Mission, speed: float = 1.0, duration_s: float | None = None)
                 readings = sim.step(command if t_s - at_s <= HELD_S else STOP)
             node.spin_until(time.perf_counter() + FLUSH_S)
         except KeyboardInterrupt:
-            pass  # how a server without a duration ends: it tells what it did
+            answered()  # how a server without a duration ends: it tells what it did
         return {
             "mission": mission.mission,
             "speed": speed,
