@@ -181,7 +181,7 @@ def test_what_cannot_be_learned_is_one_line() -> None:
 def test_a_goal_that_the_mission_draws_is_another_one_with_each_seed() -> None:
     values = reach()
     del values["world"]["goal"]
-    drawn = {"world.random_goal": {}}
+    drawn: dict[str, Any] = {"world.random_goal": {}}
     env: Any = gymnasium.make(gym.OWN, mission=values, set=drawn, disable_env_checker=True).unwrapped
     first, again, other = (env.reset(seed=seed)[0]["goal"].tolist() for seed in (1, 1, 2))
     assert first == again != other

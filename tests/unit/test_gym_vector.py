@@ -62,7 +62,7 @@ def test_each_is_equal_to_the_single_environment(mission: str) -> None:
     assert ends > 0
 
 
-DRAWN = {"world.random_start": {}, "world.random_goal": {}, "world.obstacles": []}
+DRAWN: dict[str, Any] = {"world.random_start": {}, "world.random_goal": {}, "world.obstacles": []}
 
 
 def test_every_episode_has_a_start_and_a_goal_of_its_own_where_the_mission_draws_them() -> None:
