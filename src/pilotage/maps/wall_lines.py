@@ -49,20 +49,16 @@ class WallLines:
         pieces = [piece for piece in pieces if math.hypot(*(piece[2:] - piece[:2])) > 0.0]
         pieces.sort(key=lambda piece: -math.hypot(*(piece[2:] - piece[:2])))
         lines: list[tuple[float, float]] = []
+        table = np.empty((len(pieces), 3))
         spans: list[list[_Span]] = []
         for piece in pieces:
-            number = next(
-                (
-                    k
-                    for k, line in enumerate(lines)
-                    if _on_line(piece, line, offset_tolerance_m, angle_tolerance_rad)
-                ),
-                None,
-            )
+            number = _first_line(piece, table[: len(lines)], offset_tolerance_m, angle_tolerance_rad)
             if number is None:
-                lines.append(normal_form(piece))
+                number = len(lines)
+                rho, alpha = normal_form(piece)
+                lines.append((rho, alpha))
+                table[number] = math.cos(alpha), math.sin(alpha), rho
                 spans.append([])
-                number = len(lines) - 1
             rho_alpha = lines[number]
             ends = sorted((_along(piece[:2], rho_alpha), _along(piece[2:], rho_alpha)))
             spans[number].append(_Span(ends[0], ends[1], [piece]))
@@ -108,15 +104,23 @@ def _along(point: FloatArray, line: tuple[float, float]) -> float:
     return float(-point[0] * math.sin(line[1]) + point[1] * math.cos(line[1]))
 
 
-def _on_line(segment: FloatArray, line: tuple[float, float], offset_m: float, angle_rad: float) -> bool:
-    """Whether both ends lie on the line and the segment runs along it."""
-    rho, alpha = line
-    for x, y in (segment[:2], segment[2:]):
-        if abs(x * math.cos(alpha) + y * math.sin(alpha) - rho) > offset_m:
-            return False
-    dx, dy = segment[2] - segment[0], segment[3] - segment[1]
-    across = abs(dx * math.cos(alpha) + dy * math.sin(alpha))
-    return bool(across <= angle_rad * math.hypot(dx, dy))
+def _first_line(segment: FloatArray, lines: FloatArray, offset_m: float, angle_rad: float) -> int | None:
+    """The first line that both ends of a segment (4,) lie on and that it runs along.
+
+    Parameters
+    ----------
+    lines
+        (L, 3) cos(alpha), sin(alpha) and rho of their normal forms. All at once: an outline of cells has tens
+        of thousands of pieces on thousands of lines.
+    """
+    c, s, rho = lines.T
+    x0, y0, x1, y1 = segment.tolist()
+    dx, dy = x1 - x0, y1 - y0
+    on = np.abs(x0 * c + y0 * s - rho) <= offset_m
+    on &= np.abs(x1 * c + y1 * s - rho) <= offset_m
+    on &= np.abs(dx * c + dy * s) <= angle_rad * math.hypot(dx, dy)
+    found = np.flatnonzero(on)
+    return int(found[0]) if len(found) else None
 
 
 def _merged(spans: list[_Span], touching_m: float) -> list[_Span]:
