@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pilotage.kernels.arrays import FloatArray
+from pilotage.kernels.arrays import FloatArray, IntArray
 from pilotage.kernels.geometry.motion import wrap
 from pilotage.kernels.geometry.plane import distance_to_nearest
 from pilotage.kernels.jit import kernel
@@ -15,6 +15,8 @@ from pilotage.kernels.lines.wall_candidates import overlap_share
 from pilotage.kernels.scans.rays import fan_ranges
 
 EXPLAINED, OPEN, CONTRADICTED = range(3)
+SCATTERED = 0.9
+"""The extent of a line whose ends lie askew to it by up to 25 degrees, over the distance between them."""
 
 
 class Expected(NamedTuple):
@@ -59,12 +61,14 @@ def pair_poses(
     pose, nothing = np.empty(3), np.zeros(3)
     certain = np.zeros((3, 3))
     between = wrap(lines[1, 1] - lines[0, 1])
-    for a in range(2 * walls.shape[0]):
-        first, flip_a = a // 2, a % 2
+    firsts = _long_enough(segments, ends[0], slack, least_overlap)
+    seconds = _long_enough(segments, ends[1], slack, least_overlap)
+    for a in range(2 * firsts.shape[0]):
+        first, flip_a = firsts[a // 2], a % 2
         angle_a = walls[first, 1] + flip_a * math.pi
         rho_a = walls[first, 0] * (1.0 - 2.0 * flip_a)
-        for b in range(2 * walls.shape[0]):
-            second, flip_b = b // 2, b % 2
+        for b in range(2 * seconds.shape[0]):
+            second, flip_b = seconds[b // 2], b % 2
             angle_b = walls[second, 1] + flip_b * math.pi
             error = wrap(angle_b - angle_a - between)
             if abs(error) > angle_tolerance:
@@ -98,6 +102,22 @@ def pair_poses(
             out[count] = pose
             count += 1
     return count
+
+
+@kernel
+def _long_enough(segments: FloatArray, end: FloatArray, slack: float, least_overlap: float) -> IntArray:
+    """Walls that a line of that extent can overlap by so much of it; where its ends scatter, by a little less.
+
+    An outline of cells has tens of thousands of walls that are shorter than any line.
+    """
+    least = SCATTERED * least_overlap * math.hypot(end[2] - end[0], end[3] - end[1]) - 2.0 * slack
+    found = np.empty(segments.shape[0], np.int64)
+    count = 0
+    for k in range(segments.shape[0]):
+        if math.hypot(segments[k, 2] - segments[k, 0], segments[k, 3] - segments[k, 1]) >= least:
+            found[count] = k
+            count += 1
+    return found[:count]
 
 
 @kernel
