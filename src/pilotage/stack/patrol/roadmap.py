@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
+from dataclasses import replace
 from threading import RLock
 
 import numpy as np
@@ -64,6 +65,7 @@ class Roadmap:
         self._vertices = len(vertices_xy_m)
         self._places = [(float(x), float(y)) for x, y in self.places_xy_m]
         self._fields: dict[int, FloatArray] = {}
+        self._others: dict[float, FloatArray] = {}
         self._whole: Roadmap = self
         self._cut_off: frozenset[int] = frozenset()
         self._near_m = [near_m] * self._vertices + [STATION_M] * len(stations_xy_m)
@@ -100,7 +102,7 @@ class Roadmap:
                 self._finer = self
             if self._finer is None:
                 found = copy.copy(self)
-                found._fields, found._whole, found._finer = {}, found, found
+                found._fields, found._others, found._whole, found._finer = {}, {}, found, found
                 try:
                     found._lay(self.spacing_m / FINER[1])
                     self._finer = found
@@ -161,7 +163,7 @@ class Roadmap:
         reached = free & (regions == regions[np.unravel_index(int(np.argmin(time)), time.shape)])
         rows, columns = np.nonzero(reached)
         cut_off = []
-        found._fields, found._whole, found._seeds = {}, self, list(self._seeds)
+        found._fields, found._others, found._whole, found._seeds = {}, {}, self, list(self._seeds)
         for place, seed in enumerate(self._seeds):
             if reached[seed] or not len(rows):
                 continue
@@ -241,6 +243,19 @@ class Roadmap:
         field[near][np.isfinite(slow[near])] = 0.0
         eikonal.sweep_down(field, slow, self.spacing_m)
         return field
+
+    def slowness_for(self, clearance_m: float) -> FloatArray:
+        """(rows, columns) the same for another body, which keeps so much from walls; worked out once for it.
+
+        What bodies that stand shut is shut to it as well.
+        """
+        if clearance_m == self._ground.clearance_m:
+            return self.slowness
+        if clearance_m not in self._others:
+            ground = replace(self._ground, clearance_m=clearance_m)
+            shut = np.isinf(self.slowness) & np.isfinite(self._whole.slowness)
+            self._others[clearance_m] = np.where(shut, np.inf, ground.slowness_at(self.nodes_xy_m()))
+        return self._others[clearance_m]
 
     def nodes_xy_m(self) -> FloatArray:
         """(rows, columns, 2) where the nodes are."""
