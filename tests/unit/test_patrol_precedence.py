@@ -100,13 +100,13 @@ class TestEvacuation:
         self, roadmap: Roadmap, radius_m: float, *, fits: bool
     ) -> None:
         """Into the dead end beside the path, or past it: a small one sent a large one in."""
-        line = np.column_stack([np.arange(1.0, 7.0, 0.25), np.full(24, 2.3)])
+        line = np.column_stack([np.arange(1.0, 7.0, 0.25), np.full(24, 2.0)])
         sizes = Sizes((0.3, radius_m), 0.1, 0.08)
-        search = Evacuation(roadmap, line, 0, {0: (1.0, 2.3), 1: (4.0, 2.9)}, {}, (), NOBODY, sizes)
+        search = Evacuation(roadmap, line, 0, {0: (1.0, 2.0), 1: (4.0, 2.45)}, {}, (), NOBODY, sizes)
         assert search.clear()
         _, y = search.sent[1]
-        assert (y > 3.0) is fits
-        assert abs(y - 2.3) >= sizes.apart_m(0, 1) + 0.1
+        assert (y > 2.9) is fits
+        assert abs(y - 2.0) >= sizes.apart_m(0, 1) + 0.1
 
     def test_those_behind_push_those_before_them(self, roadmap: Roadmap) -> None:
         """Two in the dead end, one comes out of its depth: the one at the mouth goes as well."""
