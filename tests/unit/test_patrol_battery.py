@@ -46,6 +46,13 @@ class TestCharging:
             # It was back on patrol after its last charge, and drove farther than one battery lasts.
             assert robot.driven_m > BATTERY["range_m"]
 
+    def test_no_path_around_a_mate_takes_the_last_metres(self) -> None:
+        """1.4 m from its station one drove 4.4 m around a mate that went to its own, until it was empty."""
+        experiment = build(mission_of(two_in_a_room(60.0), seed=25))
+        metrics = experiment.task.judge(run_loop(experiment).finished).metrics
+        assert metrics["success"]
+        assert metrics["robots_failed"] == 0
+
     def test_the_others_are_told_if_there_is_a_radio(self) -> None:
         experiment = build(mission_of(two_in_a_room(100.0), seed=2))
         heard: set[bool] = set()

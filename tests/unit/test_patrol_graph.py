@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from contract.patrol_examples import lattice
 from pilotage.core.errors import InputError
 from pilotage.evaluation.shortest_path import shortest_path
+from pilotage.kernels.control import eikonal
 from pilotage.kernels.scans.sight import hidden
 from pilotage.maps.floor import Floor
 from pilotage.maps.occupancy_grid import OccupancyGrid
@@ -272,6 +273,29 @@ def test_a_passage_between_the_nodes_is_found_on_finer_ones() -> None:
     assert 6.0 < roadmap.longest_s(0) < 14.0
     with pytest.raises(InputError, match="found none from vertex 0 to 1 of 2"):
         Roadmap(passage(0.74), places, np.zeros((0, 2)), 0.38, 1.0, 0.15, 0.5, 0.35)
+
+
+@pytest.mark.parametrize("angle_rad", [0.2, 0.3, 0.6])
+def test_straight_on_through_the_middle_of_a_door_leads_nearer(angle_rad: float) -> None:
+    """In one of 0.95 m across the lattice nodes lay one by one: for a third of the way 5 cm on were worse."""
+    along = np.array([math.cos(angle_rad), math.sin(angle_rad)])
+    turn = np.array([along, [-along[1], along[0]]])
+    geometry = passage(0.95).geometry
+    assert isinstance(geometry, SegmentMap)
+    walls = (geometry.segments_m.reshape(-1, 2) @ turn).reshape(-1, 4)
+    turned = SegmentMap(walls, np.zeros((0, 3)), (-3.0, 0.0, 10.0, 11.0))
+    world, places = WorldMap("turned", turned.bounds_m, turned), np.array([[2.0, 2.5], [8.0, 2.5]])
+    roadmap = Roadmap(world, places @ turn, np.zeros((0, 2)), 0.38, 1.0, 0.15, 0.5, 0.35)
+    grid = roadmap.time_s(1), *roadmap.origin_xy_m, roadmap.spacing_m, 2.0
+    middle = np.column_stack([np.linspace(3.8, 6.2, 241), np.full(241, 2.505)]) @ turn
+    for x, y in middle.tolist():
+        on_x, on_y = x + 0.05 * along[0], y + 0.05 * along[1]
+        assert eikonal.value_at(on_x, on_y, *grid) < eikonal.value_at(x, y, *grid)
+
+
+def test_where_there_is_room_nodes_are_as_far_apart_as_asked_for() -> None:
+    places = np.array([[2.0, 2.5], [8.0, 2.5]])
+    assert Roadmap(passage(1.2), places, np.zeros((0, 2)), 0.38, 1.0, 0.15, 0.5, 0.35).spacing_m == 0.15
 
 
 def test_the_vertex_that_is_nearest_behind_a_wall_is_not_where_a_robot_begins() -> None:

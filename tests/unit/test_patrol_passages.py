@@ -67,7 +67,8 @@ def test_for_lanes_a_door_is_as_wide_as_it_is(width_m: float, is_for_one: int) -
         ]
         assert all(told) if is_for_one else not any(told)
         rows, columns = np.nonzero(np.isfinite(roadmap.slowness) & (roadmap._width_m < pass_m))
-        off = np.hypot(0.15 * columns - x, 0.15 * rows - 2.5 - shift_m)
+        step_m = roadmap.spacing_m
+        off = np.hypot(step_m * columns - x, step_m * rows - 2.5 - shift_m)
         assert len(off) == 0 or (is_for_one and off.max() < 0.8)
 
 

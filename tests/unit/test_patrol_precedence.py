@@ -28,12 +28,13 @@ from pilotage.stack.navigator.patrol.states.lost import Lost
 from pilotage.stack.navigator.patrol.states.making_room import SteppingAside
 from pilotage.stack.navigator.patrol.states.state import Move, State, Transitions
 from pilotage.stack.navigator.patrol.states.transitions import set_out
-from pilotage.stack.patrol.evacuation import Evacuation
+from pilotage.stack.patrol.evacuation import Evacuation, Line, Sizes
 from pilotage.stack.patrol.messages import PatrolMemory
 from pilotage.stack.patrol.roadmap import Roadmap
 from pilotage.stack.patrol.word import Clearing, TeamWord
 
 APART_M = 0.7
+ALIKE = Sizes((0.3,) * 6, 0.1, 0.08)
 NOBODY = np.zeros((0, 2))
 Places = dict[int, tuple[float, float]]
 
@@ -77,7 +78,7 @@ class TestEvacuation:
                 if all(math.dist((x, y), other) > 0.75 for other in places.values()):
                     places[len(places)] = x, y
             line = line_to(roadmap, *places[0], (4.0, 6.3))
-            search = Evacuation(roadmap, line, 0, places, {}, (), NOBODY, APART_M)
+            search = Evacuation(roadmap, line, 0, places, {}, (), NOBODY, ALIKE)
             assert search.clear()
             assert 0 not in search.sent
             where = planned(places, search.sent)
@@ -88,17 +89,30 @@ class TestEvacuation:
     def test_out_of_a_dead_end_the_one_who_goes_first_makes_room_itself(self, roadmap: Roadmap) -> None:
         places: Places = {3: (4.0, 3.6), 1: (4.0, 6.2)}
         line = line_to(roadmap, *places[3], (4.0, 6.3))
-        search = Evacuation(roadmap, line, 3, places, {}, (), NOBODY, APART_M)
+        search = Evacuation(roadmap, line, 3, places, {}, (), NOBODY, ALIKE)
         assert search.clear()
         assert set(search.sent) == {1, 3}
         assert all(y < 2.7 for _, y in search.sent.values())
         assert math.dist(search.sent[1], search.sent[3]) >= APART_M
 
+    @pytest.mark.parametrize(("radius_m", "fits"), [(0.3, True), (0.42, False)])
+    def test_who_is_larger_is_sent_where_it_fits_and_off_by_more(
+        self, roadmap: Roadmap, radius_m: float, *, fits: bool
+    ) -> None:
+        """Into the dead end beside the path, or past it: a small one sent a large one in."""
+        line = np.column_stack([np.arange(1.0, 7.0, 0.25), np.full(24, 2.0)])
+        sizes = Sizes((0.3, radius_m), 0.1, 0.08)
+        search = Evacuation(roadmap, line, 0, {0: (1.0, 2.0), 1: (4.0, 2.45)}, {}, (), NOBODY, sizes)
+        assert search.clear()
+        _, y = search.sent[1]
+        assert (y > 2.9) is fits
+        assert abs(y - 2.0) >= sizes.apart_m(0, 1) + 0.1
+
     def test_those_behind_push_those_before_them(self, roadmap: Roadmap) -> None:
         """Two in the dead end, one comes out of its depth: the one at the mouth goes as well."""
         places: Places = {0: (4.0, 6.2), 1: (4.0, 5.0), 2: (4.0, 3.8)}
         line = line_to(roadmap, *places[0], (1.0, 1.5))
-        search = Evacuation(roadmap, line, 0, places, {}, (), NOBODY, APART_M)
+        search = Evacuation(roadmap, line, 0, places, {}, (), NOBODY, ALIKE)
         assert search.clear()
         assert set(search.sent) == {1, 2}
         assert all(y < 2.7 for _, y in search.sent.values())
@@ -109,11 +123,11 @@ class TestEvacuation:
         places: Places = {0: (1.0, 1.5), 1: (4.0, 6.2)}
         line = line_to(roadmap, *places[0], (4.0, 6.3))
         given: Places = {2: (4.0, 3.6)}
-        search = Evacuation(roadmap, line, 0, places | given, given, given, NOBODY, APART_M)
+        search = Evacuation(roadmap, line, 0, places | given, given, given, NOBODY, ALIKE)
         assert not search.clear()
         assert search.sent == given
         body = np.array([[4.0, 3.6]])
-        assert not Evacuation(roadmap, line, 0, places, {}, (), body, APART_M).clear()
+        assert not Evacuation(roadmap, line, 0, places, {}, (), body, ALIKE).clear()
 
     def test_a_corridor_full_of_robots_is_no_endless_search(self, monkeypatch: pytest.MonkeyPatch) -> None:
         """Four one after the other where two just fit: who pushes is pushed back, in any order."""
@@ -135,9 +149,9 @@ class TestEvacuation:
             return path_off(search, *args)
 
         monkeypatch.setattr(Evacuation, "_path_off", counted)
-        search = Evacuation(roadmap, line, 3, places, {}, (), NOBODY, APART_M)
+        search = Evacuation(roadmap, line, 3, places, {}, (), NOBODY, ALIKE)
         found, on_line = search.clear(), search._is_on
-        assert found == (not any(on_line(n, line) for n in (0, 1, 2)))
+        assert found == (not any(on_line(n, Line(line, 3)) for n in (0, 1, 2)))
         assert search._paths_left >= 0
         assert search._paths_left == 0 or found
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,6 +20,33 @@ MOST_PATHS = 48
 """So many are looked for at most; where there are places for all, a few do."""
 OFF_M = (0.25, 0.1)
 """Beyond the sum of two bodies, to keep from the path; less where there is no such place."""
+
+
+class Sizes(NamedTuple):
+    """How large the bodies of a team are, and what they keep.
+
+    Attributes
+    ----------
+    radii_m
+        By number.
+    gap_m, margin_m
+        What two that stand beside each other leave between them, and what each plans to leave to walls.
+    """
+
+    radii_m: Sequence[float]
+    gap_m: float
+    margin_m: float
+
+    def apart_m(self, one: int, other: int) -> float:
+        """Between the middles of two that stand beside each other."""
+        return self.radii_m[one] + self.radii_m[other] + self.gap_m
+
+
+class Line(NamedTuple):
+    """(K, 2) a path, and the number of the robot that goes there."""
+
+    xy_m: FloatArray
+    robot: int
 
 
 class Evacuation:
@@ -43,9 +71,9 @@ class Evacuation:
     given
         Those of them who were told by others, and cannot be told otherwise.
     fixed_xy_m
-        (F, 2) bodies that nobody can tell to go.
-    apart_m
-        Between the middles of two that stand beside each other.
+        (F, 2) bodies that nobody can tell to go; they are taken for as large as the one who goes first.
+    sizes
+        Who is larger has fewer places, and leaves the path by more.
 
     Attributes
     ----------
@@ -62,10 +90,10 @@ class Evacuation:
         sent: Mapping[int, tuple[float, float]],
         given: Collection[int],
         fixed_xy_m: FloatArray,
-        apart_m: float,
+        sizes: Sizes,
     ) -> None:
-        self._first, self._places, self._apart_m = first, places, apart_m
-        self._line, self._fixed = line_xy_m, fixed_xy_m
+        self._first, self._places, self._sizes = first, places, sizes
+        self._line, self._fixed = Line(line_xy_m, first), fixed_xy_m
         self.sent = dict(sent)
         self._given = given
         self._paths_left, self._from_lines = MOST_PATHS, dict[bytes, FloatArray]()
@@ -74,9 +102,9 @@ class Evacuation:
         low = np.floor((line_xy_m.min(axis=0) - AROUND_M - (x0, y0)) / step).astype(np.int64)
         high = np.ceil((line_xy_m.max(axis=0) + AROUND_M - (x0, y0)) / step).astype(np.int64)
         column, row = np.maximum(low, 0).tolist()
-        self._slow = roadmap.slowness[row : high[1] + 1, column : high[0] + 1]
+        self._roadmap, self._window = roadmap, np.s_[row : high[1] + 1, column : high[0] + 1]
         self._step_m, self._x0, self._y0 = step, x0 + column * step, y0 + row * step
-        rows, columns = self._slow.shape
+        rows, columns = roadmap.slowness[self._window].shape
         xs, ys = self._x0 + step * np.arange(columns), self._y0 + step * np.arange(rows)
         self._nodes: FloatArray = np.stack(np.meshgrid(xs, ys), axis=-1)
 
@@ -86,28 +114,28 @@ class Evacuation:
             n for n in self._places if n != self._first and n not in self.sent and self._is_on(n, self._line)
         ]
         # Those at its far end make room for those before them.
-        along = {n: int(np.argmin(np.hypot(*(self._line - self._places[n]).T))) for n in on}
+        along = {n: int(np.argmin(np.hypot(*(self._line.xy_m - self._places[n]).T))) for n in on}
         found = [self._leave(n, [self._line], 0) for n in sorted(on, key=lambda n: -along[n])]
         return all(found)
 
-    def _is_on(self, number: int, line: FloatArray) -> bool:
+    def _is_on(self, number: int, line: Line) -> bool:
         """Whether a robot stands on a path, or will when it is where it was told to go."""
-        place = self.sent.get(number, self._places[number])
-        return bool(np.hypot(*(line - place).T).min() < self._apart_m + OFF_M[-1])
+        place, apart_m = self.sent.get(number, self._places[number]), self._sizes.apart_m(number, line.robot)
+        return bool(np.hypot(*(line.xy_m - place).T).min() < apart_m + OFF_M[-1])
 
-    def _leave(self, number: int, lines: Sequence[FloatArray], depth: int) -> bool:
+    def _leave(self, number: int, lines: Sequence[Line], depth: int) -> bool:
         """Find a place off some paths for one robot, and for those whom it has to push."""
         others = {n: self.sent.get(n, place) for n, place in self._places.items() if n != number}
         fixed = {n: place for n, place in others.items() if n in self._given}
         # Past everybody; pushing all but the one who goes first, who comes back to its own path; it as well.
         for stays in (others, fixed | {n: others[n] for n in others if n == self._first}, fixed):
             for off_m in OFF_M:
-                path = self._path_off(number, lines, stays, self._apart_m + off_m)
-                if path is None:
+                way = self._path_off(number, lines, stays, off_m)
+                if way is None:
                     continue
-                before = dict(self.sent)
+                before, path = dict(self.sent), Line(way, number)
                 pushed = [n for n in others if n not in stays and self._is_on(n, path)]
-                x, y = path[-1].tolist()
+                x, y = way[-1].tolist()
                 self.sent[number] = x, y
                 if not pushed:
                     return True
@@ -122,7 +150,7 @@ class Evacuation:
     def _path_off(
         self,
         number: int,
-        lines: Sequence[FloatArray],
+        lines: Sequence[Line],
         stays: Mapping[int, tuple[float, float]],
         off_m: float,
     ) -> FloatArray | None:
@@ -130,11 +158,13 @@ class Evacuation:
         if self._paths_left == 0:
             return None
         self._paths_left -= 1
-        here = np.array(self._places[number])
-        slow = self._slow.copy()
+        here, sizes = np.array(self._places[number]), self._sizes
+        clearance_m = sizes.radii_m[number] + sizes.margin_m
+        slow = self._roadmap.slowness_for(clearance_m)[self._window].copy()
         taken = np.zeros(slow.shape, dtype=np.bool_)
-        for body in [*self._fixed, *map(np.array, stays.values())]:
-            taken |= self._near(body, here, slow)
+        bodies = [(body, self._first) for body in self._fixed]
+        for body, other in [*bodies, *((np.array(place), n) for n, place in stays.items())]:
+            taken |= self._near(body, here, slow, sizes.apart_m(number, other))
         time = np.full(slow.shape, np.inf)
         row, column = round((here[1] - self._y0) / self._step_m), round((here[0] - self._x0) / self._step_m)
         if not (0 <= row < slow.shape[0] and 0 <= column < slow.shape[1]):
@@ -144,7 +174,7 @@ class Evacuation:
         eikonal.sweep_down(time, slow, self._step_m)
         when = np.where(taken, np.inf, time)
         for line in lines:
-            when[self._away_m(line) < off_m] = np.inf
+            when[self._away_m(line.xy_m) < sizes.apart_m(number, line.robot) + off_m] = np.inf
         best = np.unravel_index(int(np.argmin(when)), when.shape)
         if not math.isfinite(when[best]):
             return None
@@ -158,14 +188,14 @@ class Evacuation:
         """(rows, columns) how far nodes are from a path, worked out once for it."""
         key = line_xy_m.tobytes()
         if key not in self._from_lines:
-            nearest = np.full(self._slow.shape, np.inf)
+            nearest = np.full(self._nodes.shape[:2], np.inf)
             for place in line_xy_m:
                 np.minimum(nearest, np.hypot(*(self._nodes - place).transpose(2, 0, 1)), out=nearest)
             self._from_lines[key] = nearest
         return self._from_lines[key]
 
-    def _near(self, body: FloatArray, here: FloatArray, slow: FloatArray) -> BoolArray:
+    def _near(self, body: FloatArray, here: FloatArray, slow: FloatArray, apart_m: float) -> BoolArray:
         """Nodes that a body keeps; no path leads there, but for one that it stands close to already."""
         away = np.hypot(*(self._nodes - body).transpose(2, 0, 1))
-        slow[away < min(self._apart_m, float(np.hypot(*(body - here))) - 1.5 * self._step_m)] = np.inf
-        return np.asarray(away < self._apart_m)
+        slow[away < min(apart_m, float(np.hypot(*(body - here))) - 1.5 * self._step_m)] = np.inf
+        return np.asarray(away < apart_m)

@@ -60,11 +60,18 @@ class Ground:
         ys = np.arange(ymin, ymax + 0.5 * spacing_m, spacing_m)
         grid = np.stack(np.meshgrid(xs, ys), axis=-1)
         distance = self.field.at(grid.reshape(-1, 2)).reshape(grid.shape[:2])
-        free = distance >= self.clearance_m
-        tight = np.clip(1.0 - (distance - self.clearance_m) / EASY_M, 0.0, 1.0)
-        slowness = np.where(free, (1.0 + TIGHT_FACTOR * tight**2) / self.speed_m_s, np.inf)
+        slowness = self._slowness(distance)
         fine = self._fine(spacing_m, distance)
         return slowness, self._room(spacing_m, fine, distance.shape), self._half_widths(fine, grid, distance)
+
+    def _slowness(self, distance: FloatArray) -> FloatArray:
+        tight = np.clip(1.0 - (distance - self.clearance_m) / EASY_M, 0.0, 1.0)
+        slow = (1.0 + TIGHT_FACTOR * tight**2) / self.speed_m_s
+        return np.where(distance >= self.clearance_m, slow, np.inf)
+
+    def slowness_at(self, places_xy_m: FloatArray) -> FloatArray:
+        """(rows, columns) seconds a metre at places (rows, columns, 2), as ``nodes``."""
+        return self._slowness(self.field.at(places_xy_m.reshape(-1, 2)).reshape(places_xy_m.shape[:2]))
 
     def _fine(self, spacing_m: float, distance: FloatArray) -> DistanceField:
         """Distances at points nearer to each other, exact where walls are known.

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import copy
 import math
+from dataclasses import replace
+from functools import reduce
 from threading import RLock
 
 import numpy as np
@@ -19,7 +21,8 @@ from pilotage.stack.patrol.nodes import Ground
 STEP_M = 0.25
 """Of paths."""
 FINER, MOST_NODES = (1, 2, 4), 2_000_000
-"""Nodes may lie beside a passage that the body just fits through: then they lie so many times as near."""
+"""Nodes may lie beside a passage that the body just fits through, or one by one in it: then they lie so many
+times as near."""
 NEAREST = 6
 MOST_FIELD_BYTES = 256_000_000
 """Of fields that are kept; beyond that who was not asked for longest is worked out again."""
@@ -64,6 +67,7 @@ class Roadmap:
         self._vertices = len(vertices_xy_m)
         self._places = [(float(x), float(y)) for x, y in self.places_xy_m]
         self._fields: dict[int, FloatArray] = {}
+        self._others: dict[float, FloatArray] = {}
         self._whole: Roadmap = self
         self._cut_off: frozenset[int] = frozenset()
         self._near_m = [near_m] * self._vertices + [STATION_M] * len(stations_xy_m)
@@ -75,13 +79,20 @@ class Roadmap:
                 f"stack.navigator.spacing_m: expected at most {MOST_NODES} nodes on a map of "
                 f"{xmax - xmin:.1f} x {ymax - ymin:.1f} m, found {spacing_m:g} m between them; take more"
             )
+        joined_m: float | None = None
         for finer in FINER:
             try:
                 self._lay(spacing_m / finer)
-                return
+                if self._is_wide():
+                    return
+                joined_m = joined_m or self.spacing_m
             except InputError:
-                if finer == FINER[-1] or 4 * self.slowness.size > MOST_NODES:
+                if joined_m is None and (finer == FINER[-1] or 4 * self.slowness.size > MOST_NODES):
                     raise
+            if 4 * self.slowness.size > MOST_NODES:
+                break
+        assert joined_m is not None, "else it was refused"
+        self._lay(joined_m)
 
     def _lay(self, spacing_m: float) -> None:
         """Lay the nodes over the ground."""
@@ -90,6 +101,17 @@ class Roadmap:
         # Where there is room for all fields nobody need know which of them was asked for last.
         self._all_kept = len(self._places) * self.slowness.nbytes <= MOST_FIELD_BYTES
         self._seeds = self._joined(self._ground.clearance_m)
+
+    def _is_wide(self) -> bool:
+        """Whether paths lead from place to place between four free nodes all the way.
+
+        A place counts as farther from the goal the nearer it is to a node where the body does not fit: where
+        nodes step aside one by one in a door, who speeds up slowly stood, as it looks ahead no farther.
+        """
+        free = np.isfinite(self.slowness)
+        between, _ = scipy.ndimage.label(free[:-1, :-1] & free[1:, :-1] & free[:-1, 1:] & free[1:, 1:])
+        touched = [np.unique(between[max(0, r - 1) : r + 1, max(0, c - 1) : c + 1]) for r, c in self._seeds]
+        return bool(reduce(np.intersect1d, touched).any())
 
     def finer(self) -> Roadmap:
         """The same with nodes half as far from each other, worked out once: beside bodies there may be room
@@ -100,7 +122,7 @@ class Roadmap:
                 self._finer = self
             if self._finer is None:
                 found = copy.copy(self)
-                found._fields, found._whole, found._finer = {}, found, found
+                found._fields, found._others, found._whole, found._finer = {}, {}, found, found
                 try:
                     found._lay(self.spacing_m / FINER[1])
                     self._finer = found
@@ -161,7 +183,7 @@ class Roadmap:
         reached = free & (regions == regions[np.unravel_index(int(np.argmin(time)), time.shape)])
         rows, columns = np.nonzero(reached)
         cut_off = []
-        found._fields, found._whole, found._seeds = {}, self, list(self._seeds)
+        found._fields, found._others, found._whole, found._seeds = {}, {}, self, list(self._seeds)
         for place, seed in enumerate(self._seeds):
             if reached[seed] or not len(rows):
                 continue
@@ -241,6 +263,19 @@ class Roadmap:
         field[near][np.isfinite(slow[near])] = 0.0
         eikonal.sweep_down(field, slow, self.spacing_m)
         return field
+
+    def slowness_for(self, clearance_m: float) -> FloatArray:
+        """(rows, columns) the same for another body, which keeps so much from walls; worked out once for it.
+
+        What bodies that stand shut is shut to it as well.
+        """
+        if clearance_m == self._ground.clearance_m:
+            return self.slowness
+        if clearance_m not in self._others:
+            ground = replace(self._ground, clearance_m=clearance_m)
+            shut = np.isinf(self.slowness) & np.isfinite(self._whole.slowness)
+            self._others[clearance_m] = np.where(shut, np.inf, ground.slowness_at(self.nodes_xy_m()))
+        return self._others[clearance_m]
 
     def nodes_xy_m(self) -> FloatArray:
         """(rows, columns, 2) where the nodes are."""

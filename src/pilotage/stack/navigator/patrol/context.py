@@ -244,7 +244,11 @@ class Context(Paths):
         return strategy.is_away and strategy.calls_back(self._knowledge())
 
     def lead(self, vertex: int, *, first: bool = False) -> Twist:
-        """The command that leads to a vertex; who goes ``first`` drives on towards mates who talk."""
+        """The command that leads to a vertex; who goes ``first`` drives on towards mates who talk.
+
+        As does who has no metre of its battery to spare for a path around them: they make room.
+        """
+        first |= self.must_go_home()
         then = self._then if vertex == self.hop != self._then else -1
         at, came_from = self.roadmap.places_xy_m[vertex], self.came_from
         return self.motion.descend(

@@ -25,7 +25,7 @@ from pilotage.stack.navigator.patrol.states.driving import Waiting
 from pilotage.stack.navigator.patrol.states.lost import Lost
 from pilotage.stack.navigator.patrol.states.state import Move, State, Transitions
 from pilotage.stack.navigator.patrol.states.transitions import forgo
-from pilotage.stack.patrol.evacuation import Evacuation
+from pilotage.stack.patrol.evacuation import Evacuation, Sizes
 from pilotage.stack.patrol.roadmap import STEP_M
 from pilotage.stack.patrol.word import Clearing
 
@@ -98,11 +98,11 @@ class Leading:
 
         Who stands where it was told to stands as far from the path as there was room: waiting brings no more.
         """
-        context = self.context
+        context, sizes = self.context, sizes_of(self.context)
         return any(
             context.t_s - self.since_s[n] < HOLD_S
             and math.dist(places[n], place) > context.radius_m
-            and np.hypot(*(ahead - places[n]).T).min() < apart_m(context)
+            and np.hypot(*(ahead - places[n]).T).min() < sizes.apart_m(n, context.task.robot)
             for n, place in self.sent.items()
             if n in places
         )
@@ -130,7 +130,7 @@ class Leading:
             kept | others,
             others,
             np.array(silent).reshape(-1, 2),
-            apart_m(context),
+            sizes_of(context),
         )
         search.clear()
         self.sent = {n: place for n, place in search.sent.items() if n not in others}
@@ -184,9 +184,9 @@ class Evacuating:
         return Move(self, command if context.motion.to_go_s > THERE_S else context.motion.stand())
 
 
-def apart_m(context: Context) -> float:
-    """Between the middles of two that stand beside each other."""
-    return 2.0 * context.radius_m + context.config.gap_m
+def sizes_of(context: Context) -> Sizes:
+    """Of the team."""
+    return Sizes(context.task.radii_m, context.config.gap_m, context.config.plan_margin_m)
 
 
 def orders(context: Context, since_s: float) -> dict[int, Place]:
