@@ -180,7 +180,7 @@ def drive(context: Context, state: Driving, readings: Readings, belief: Belief) 
     act = context.yielding.step(rate, rate * abs(speed_m_s) * context.dt_s, backs=backs)
     context.yielding.drove(reached, backs=backs)
     if act is not Act.NOTHING:
-        return Move(give_way(context, state, t_s, belief, act), STOP)
+        return Move(give_way(context, state, t_s, belief, act, float(row[5])), STOP)
     return Move(state, command)
 
 
@@ -210,10 +210,13 @@ def step_clear(context: Context, t_s: float, belief: Belief) -> SteppingClear | 
     return SteppingClear(context, step, t_s + STEP_S)
 
 
-def give_way(context: Context, state: Driving, t_s: float, belief: Belief, act: Act) -> State:
+def give_way(context: Context, state: Driving, t_s: float, belief: Belief, act: Act, to_go_m: float) -> State:
     """Having been held up for long: around what it sees, or back the way that it came."""
-    if context.yielding.gives_up and not context.has_mates:
-        return fail(context, t_s, "stuck: something stands in its way, and nothing leads around")
+    context.held_up(math.inf if isinstance(state, BackingOut) else to_go_m)
+    if context.holds.too_many:
+        around = context.planned_around(t_s, belief.pose)
+        found = "a path around leads no farther" if around.path is not None else around.reason
+        return fail(context, t_s, f"stuck: something stands in its way: {found}")
     out: State | None = None
     if act is Act.BACK:
         out = back_out(context, t_s, belief, "backs out the way that it came")
