@@ -37,7 +37,7 @@ from pilotage.stack.control.own_half import OwnHalf
 from pilotage.stack.planning.boustrophedon import BoustrophedonConfig, BoustrophedonPlanner
 from pilotage.stack.planning.planner import PlanRequest, PlanResult
 from pilotage.stack.planning.sweep_changes import subdivided
-from pilotage.stack.planning.sweep_floor import Sought, covered, rest_of
+from pilotage.stack.planning.sweep_floor import Sought, covered, rest_of, whole_floor
 from pilotage.stack.planning.sweep_room import Keeping, path_floor
 from support.missions import MISSIONS
 
@@ -118,13 +118,27 @@ def test_a_clearance_that_would_shut_a_door_is_kept_everywhere_else() -> None:
     world = WorldMap(
         "rooms", (0.0, 0.0, 10.0, 8.0), geometry=SegmentMap(walls, NO_DISCS, (0.0, 0.0, 10.0, 8.0))
     )
-    floor = path_floor(world.field, Keeping(0.17, 0.25, (1.0, 1.0)), 0.24)
+    told = Floor.of(world, 0.17, 0.02, (1.0, 1.0), exact=True)
+    floor = path_floor(world.field, Keeping(0.17, 0.25, (1.0, 1.0)), 0.24, told)
     assert floor.reachable[floor.cell_of(np.array([1.0, 1.0]))]
     assert floor.reachable[floor.cell_of(np.array([8.0, 4.0]))]
     for beside_a_wall in ((0.2, 4.0), (3.0, 0.2), (5.8, 6.0), (9.8, 4.0)):
         assert not floor.reachable[floor.cell_of(np.array(beside_a_wall))]
     through = floor.reachable & (np.abs(floor.clearance_m - 0.24) < 0.005)
     assert np.abs(floor.middles(through)[:, 0] - 6.0).min() < 0.05, "the door's middle"
+
+
+@pytest.mark.parametrize("radius_m", [0.172, 0.175, 0.176, 0.21, 0.25])
+def test_all_of_the_floor_is_to_be_swept_however_near_to_walls_its_cells_lie(radius_m: float) -> None:
+    """A row of cells along a wall that was none of a path's was out of its reach, and left for good."""
+    walls = np.array(
+        [[0, 0, 6.2, 0], [6.2, 0, 6.2, 4], [6.2, 4, 0, 4], [0, 4, 0, 0], [3, 0, 3, 2]], dtype=float
+    )
+    world = WorldMap(
+        "rooms", (0.0, 0.0, 6.2, 4.0), geometry=SegmentMap(walls, NO_DISCS, (0.0, 0.0, 6.2, 4.0))
+    )
+    sought = whole_floor(world.field, Keeping(radius_m, 0.3, (1.0, 1.0)), 1.6 * radius_m, 0.012)
+    assert np.array_equal(sought.must, sought.floor.reachable)
 
 
 def test_of_what_was_driven_the_rest_is_swept_and_no_more() -> None:

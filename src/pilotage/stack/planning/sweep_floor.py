@@ -48,7 +48,7 @@ def whole_floor(field: DistanceField, keeping: Keeping, width_m: float, overlap_
     radius_m, inside = keeping.radius_m, keeping.start_xy_m
     cell_m = pass_cell_m(width_m, radius_m)
     floor = Floor.of_field(field, field.bounds_m, radius_m, cell_m, inside, exact=True)
-    inner = path_floor(field, keeping, width_m)
+    inner = path_floor(field, keeping, width_m, floor)
     rim = sweepable(floor, width_m) & ~floor.reachable
     must = floor.reachable & _within_reach(floor, inner, 0.5 * width_m - floor.cell_m)
     return Sought(floor, inner, must, rim, width_m - overlap_m)
