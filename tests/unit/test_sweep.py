@@ -410,6 +410,20 @@ class TestTask:
         assert len(run.robots[0].plans) >= 2
         assert metrics["success"], metrics["reason"]
 
+    def test_a_room_that_nobody_asks_for_is_no_waste(self) -> None:
+        """A door with 3 cm to spare is none for cells of 3 cm that ask for 2: a ratio of 2."""
+        values = copy.deepcopy(MISSIONS["sweep-floor"])
+        door = [[2.5, 0, 2.5, 0.767], [2.5, 1.213, 2.5, 2]]
+        walls = [[0, 0, 5, 0], [5, 0, 5, 2], [5, 2, 0, 2], [0, 2, 0, 0], *door]
+        values["world"] |= {"map": {"map": "rooms", "walls_m": walls}, "start": {"x_m": 1.0, "y_m": 1.0}}
+        values["robot"]["footprint"] = {"radius_m": 0.193}
+        values["task"] = {"name": "sweep-floor", "width_m": 0.36}
+        values["stack"]["planner"]["width_m"] = 0.36
+        experiment = build(mission_of(values, seed=0))
+        metrics = experiment.task.judge(run_loop(experiment).finished).metrics
+        assert metrics["success"], metrics["reason"]
+        assert float(str(metrics["sweep_ratio"])) < 1.2
+
     def test_where_it_was_shown_no_room_it_looks_again_in_the_end(
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:
