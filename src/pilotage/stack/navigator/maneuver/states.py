@@ -20,7 +20,7 @@ MOST_REPLANS, MOST_RESTS = 8, 3
 """How often it plans anew where it went astray, and for what a path that covers a floor left of it."""
 LOOK_S = 2.0
 """A robot that believes to stand in a wall looks around for so long before it plans anew: once, or until it
-knows its place."""
+knows its place. So does who plans a path that it would not plan again for what its first readings correct."""
 DOUBT_S = 10.0
 """Who is lost stands for so long, and drives about then."""
 AROUND, BACKING = 0.6, 0.2
@@ -117,9 +117,11 @@ Driving: TypeAlias = Following | BackingOut
 
 
 def first_state(context: Context, belief: Belief) -> State:
-    """Plan at once, or once it knows where it is."""
+    """Plan at once, or once it knows where it is: by its first readings where plans take long."""
     if belief.status is BeliefStatus.LOST:
         return Lost(context, LookingAround(context, 0.0), -DOUBT_S)
+    if context.plan.takes_long:
+        return LookingAround(context, LOOK_S)
     return plan(context, 0.0, belief)
 
 
@@ -135,7 +137,7 @@ def plan(context: Context, t_s: float, belief: Belief) -> State:
     if result.covers and context.trail is None:
         context.trail = Trail()
     context.lay_out(path, belief.pose.theta_rad)
-    context.journal.say(t_s, "plan" if t_s == 0.0 else "replan", result.reason)
+    context.journal.say(t_s, "replan" if again else "plan", result.reason)
     return Following(context)
 
 
