@@ -143,6 +143,21 @@ def test_all_of_the_floor_is_to_be_swept_however_near_to_walls_its_cells_lie(rad
     assert np.array_equal(sought.must, sought.floor.reachable)
 
 
+def test_a_body_keeps_room_for_what_its_lasers_stop_it_before_where_there_is_some() -> None:
+    """Planned for a clearance that the body itself needs it was stopped beside walls, a dozen times."""
+    world = WorldMap(
+        "rooms", (0.0, 0.0, 10.0, 8.0), geometry=SegmentMap(NARROW_DOOR, NO_DISCS, (0.0, 0.0, 10.0, 8.0))
+    )
+    planner = BoustrophedonPlanner(BoustrophedonConfig(width_m=0.5, clearance_m=0.3))
+    rng = np.random.default_rng(0)
+    request = PlanRequest(Pose2(1.0, 1.0, 0.0), Goal(1.0, 1.0), world.field, rng, footprint=BODY)
+    path = planner.plan(request).path
+    assert path is not None
+    kept_m = np.array([world.walls.distance_m(x, y) for x, y in path.states[:, :2]])
+    in_the_door = np.hypot(*(path.states[:, :2] - [6.0, 3.35]).T) < 0.6
+    assert kept_m[~in_the_door].min() >= 0.33
+
+
 def test_of_an_error_that_passes_overlap_for_nobody_drives_back() -> None:
     """Of a robot that was sure of 0.4 mm one of 1.3 mm for a moment asked for 16 m for three cells."""
     world, whole = swept_floor("a room")
@@ -461,7 +476,7 @@ class TestTask:
         refused: list[float] = []
 
         def doubts(self: LastWord, command: Twist) -> bool:
-            if self._t_s >= 20.0 and not refused:
+            if self._t_s >= 22.0 and not refused:
                 refused.append(self._t_s)
                 self.shown_m = np.column_stack([np.full(7, 0.4), np.linspace(-0.3, 0.3, 7)])
                 return False
