@@ -454,6 +454,17 @@ class TestTask:
         began = np.array([told["true_x_m"][0], told["true_y_m"][0]])
         assert np.hypot(*(plan.states[0, :2] - began)) < 0.01
 
+    @pytest.mark.parametrize("localizer", ["slam", "dead-reckoning"])
+    def test_who_never_mends_its_start_is_told_so_before_it_sweeps(self, localizer: str) -> None:
+        """Three of four that made their own map gave up, centimetres off, or swept 99.97 %."""
+        vague = {"x_var_m2": 0.01, "y_var_m2": 0.01, "theta_var_rad2": 0.01}
+        values = copy.deepcopy(MISSIONS["sweep-floor"])
+        values["stack"]["localizer"], values["stack"]["initial"] = localizer, vague
+        with pytest.raises(InputError, match=r"^navigator 'maneuver': .* take stack\.localizer: laser"):
+            build(mission_of(values, seed=0))
+        values["stack"]["initial"] = dict.fromkeys(vague, 1e-6)
+        build(mission_of(values, seed=0))
+
     def test_a_room_that_nobody_asks_for_is_no_waste(self) -> None:
         """A door with 3 cm to spare is none for cells of 3 cm that ask for 2: a ratio of 2."""
         values = copy.deepcopy(MISSIONS["sweep-floor"])
