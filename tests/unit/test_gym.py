@@ -19,6 +19,7 @@ from pilotage.core.types import Pose2  # noqa: E402
 from pilotage.sensors.numbers import Numbers, SensorSetting  # noqa: E402
 from pilotage.sensors.sensor import SENSORS, SensorConfig  # noqa: E402
 from pilotage.sim.sensing.sensor import SIMULATED_SENSORS  # noqa: E402
+from support.missions import reach  # noqa: E402
 
 
 def rollout(env: Any, seed: int, steps: int = 30) -> list[Any]:
@@ -175,3 +176,15 @@ def test_what_cannot_be_learned_is_one_line() -> None:
         gymnasium.make("pilotage/romi-explore-v0")
     with pytest.raises(pl.InputError, match="one robot"):
         gymnasium.make(gym.OWN, mission={"extends": "museum-1", "mission": "two", "robots": [{}, {}]})
+
+
+def test_a_goal_that_the_mission_draws_is_another_one_with_each_seed() -> None:
+    values = reach()
+    del values["world"]["goal"]
+    drawn: dict[str, Any] = {"world.random_goal": {}}
+    env: Any = gymnasium.make(gym.OWN, mission=values, set=drawn, disable_env_checker=True).unwrapped
+    first, again, other = (env.reset(seed=seed)[0]["goal"].tolist() for seed in (1, 1, 2))
+    assert first == again != other
+    seen, _, _, _, info = env.step(np.zeros(2, np.float32))
+    assert seen["goal"].tolist() == pytest.approx(other)
+    assert info["reward_terms"]["progress"] == pytest.approx(0.0)

@@ -62,6 +62,34 @@ def test_each_is_equal_to_the_single_environment(mission: str) -> None:
     assert ends > 0
 
 
+DRAWN: dict[str, Any] = {"world.random_start": {}, "world.random_goal": {}, "world.obstacles": []}
+
+
+def test_every_episode_has_a_start_and_a_goal_of_its_own_where_the_mission_draws_them() -> None:
+    """Out of those that the mission's seed gives; which, by the environments' seed and not by the threads."""
+
+    def begun(seed: int, threads: int) -> Any:
+        env = many(count=40, set=EXACT | DRAWN, threads=threads)
+        first, _ = env.reset(seed=seed)
+        seen, beginnings = first, [first["goal"]]
+        for _ in range(200):
+            over = env._over.copy()
+            seen, *_ = env.step(np.tile(np.array([1.0, 0.3], np.float32), (40, 1)))
+            beginnings.append(seen["goal"][over])
+        env.close()
+        return np.concatenate(beginnings), first["lidar"]
+
+    goals, scans = begun(3, 1)
+    assert len(goals) > 80
+    assert len(np.unique(goals[:, 0])) > 0.9 * len(goals)
+    assert goals[:, 0].min() > 0.6
+    # All stand on the floor, with the room that was asked for, but for what the body moved none yet.
+    assert scans.min() > 0.6 - 1e-6
+    again, _ = begun(3, 4)
+    assert np.array_equal(goals, again)
+    assert not np.array_equal(goals[:40], begun(4, 1)[0][:40])
+
+
 def test_noise_goes_by_the_seed_and_not_by_the_threads() -> None:
     actions = np.random.default_rng(0).uniform(-1.0, 1.0, (20, 7, 2)).astype(np.float32)
 

@@ -222,6 +222,7 @@ def test_the_least_of_what_was_left_is_left_for_good() -> None:
     share = np.count_nonzero(rest) / np.count_nonzero(floor.reachable)
     assert 0.0 < share < 0.1
     assert not rest_of(sought, driven, 0.8, 1.0 - 1.01 * share).must.any()
+    assert (rest_of(sought, np.empty((0, 3)), 0.8, 1.0).must == sought.must).all()
     assert (rest_of(sought, driven, 0.8, 1.0 - 0.99 * share / 2).must <= rest).all()
 
 

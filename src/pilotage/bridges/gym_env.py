@@ -46,6 +46,8 @@ class MissionEnv(gymnasium.Env[Any, Any]):
     **Reward** a step, in ``info["reward_terms"]`` one by one: ``progress`` (metres by which the straight line
     to the goal became shorter), ``time`` (-0.01), ``collision`` (-10), ``reached`` (+10).
 
+    Where the mission draws its start or its goal each beginning has others, of its seed.
+
     **Over** when the goal is reached within its tolerance (a heading that it asks for is not looked at) or
     something is hit; truncated at the mission's time limit.
 
@@ -69,7 +71,7 @@ class MissionEnv(gymnasium.Env[Any, Any]):
         set: Mapping[str, Any] | None = None,  # noqa: A002 - as the command line calls it
     ) -> None:
         self.mission = load(mission, set=set)
-        self._goal = goal_of(self.mission)
+        check_goal(self.mission)
         motion = motion_of(self.mission.members[0], "robot")
         top = [motion.top_speed_m_s, motion.top_turn_rate_rad_s]
         self._top = np.array(top + [motion.top_lateral_m_s] * motion.drives_sideways)
@@ -83,7 +85,7 @@ class MissionEnv(gymnasium.Env[Any, Any]):
         self.observation_space = spaces.Dict({**self._words.spaces})
         self.action_space = spaces.Box(-1.0, 1.0, self._top.shape, np.float32)
         self._sim: Simulation | None = None
-        self._to_go_m = math.nan
+        self._goal, self._to_go_m = GoalConfig(x_m=0.0, y_m=0.0), math.nan  # until a reset
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -95,6 +97,7 @@ class MissionEnv(gymnasium.Env[Any, Any]):
             self._sim = make(self.mission, seed=drawn)
         readings = self._sim.reset(drawn)
         self._words.forget()
+        self._goal = goal_of(self._sim.drawn)
         observation = self._observed(readings)
         self._to_go_m = float(observation["goal"][0])
         return observation, {"seed": drawn, "t_s": readings.t_s, "spoke": tuple(readings.by_sensor)}
@@ -137,17 +140,22 @@ class MissionEnv(gymnasium.Env[Any, Any]):
         return self._words.hear(readings)
 
 
-def goal_of(mission: Mission) -> GoalConfig:
-    """The goal of a mission that can be an environment.
+def check_goal(mission: Mission) -> None:
+    """Refuse what can be no environment.
 
     Raises
     ------
     InputError
-        Where it has several robots or no goal.
+        Where a mission has several robots or no goal.
     """
     if mission.robots:
         raise InputError(f"gymnasium: expected a mission with one robot, found {len(mission.robots)}")
-    goal = mission.goal_of(mission.members[0])
-    if goal is None:
+    if mission.goal_of(mission.members[0]) is None and mission.world.random_goal is None:
         raise InputError(f"gymnasium: expected a mission with world.goal, found '{mission.mission}'")
+
+
+def goal_of(drawn: Mission) -> GoalConfig:
+    """The goal of a mission that can be an environment, whose places are drawn."""
+    goal = drawn.goal_of(drawn.members[0])
+    assert goal is not None, "checked above"
     return goal

@@ -15,13 +15,17 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from pilotage.bridges.gym_action import shares_of
-from pilotage.bridges.gym_env import A_STEP, HIT, LARGEST_SEED, REACHED, goal_of
+from pilotage.bridges.gym_env import A_STEP, HIT, LARGEST_SEED, REACHED, check_goal, goal_of
 from pilotage.core import given
 from pilotage.core.errors import InputError
-from pilotage.experiments.build.build import build_source
+from pilotage.core.random import RandomStreams
+from pilotage.core.types import FloatArray
+from pilotage.experiments.build.build import Source, build_source
+from pilotage.experiments.build.places import pose_of, random_places
 from pilotage.experiments.build.robots import sensors_of
 from pilotage.face.missions import MissionLike, load
 from pilotage.kernels.bodies import drive, environments
+from pilotage.missions.mission import Mission
 from pilotage.models.motion.differential_drive import DifferentialDriveConfig
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.numbers import FARTHEST_M
@@ -30,6 +34,8 @@ from pilotage.sim.sensing.lidar import fan_of
 Observations = dict[str, NDArray[np.float32]]
 MOST_BEAMS = 50_000_000
 """Of all environments together; each takes some 20 bytes."""
+PLACES = 1000
+"""So many starts and goals are drawn for episodes to choose from."""
 
 
 class MissionVectorEnv(VectorEnv[Any, Any, Any]):
@@ -40,7 +46,8 @@ class MissionVectorEnv(VectorEnv[Any, Any, Any]):
     is over begins anew in the next step, whose action and reward do not count (``AutoresetMode.NEXT_STEP``).
 
     The kernels are those that simulate every mission: without noise the numbers are equal to those of
-    ``MissionEnv``. Obstacles that a seed places stand where the mission's own seed puts them.
+    ``MissionEnv``. Obstacles that a seed places stand where the mission's own seed puts them; a start or a
+    goal that the mission draws is another one in each episode, out of ``PLACES`` of that seed.
 
     Parameters
     ----------
@@ -73,8 +80,9 @@ class MissionVectorEnv(VectorEnv[Any, Any, Any]):
         num_envs = given.whole("gymnasium: num_envs", num_envs, 1)
         threads = None if threads is None else given.whole("gymnasium: threads", threads, 1)
         self.mission = load(mission, set=set)
-        goal = goal_of(self.mission)
-        source = build_source(self.mission).simulator
+        check_goal(self.mission)
+        built = build_source(self.mission)
+        source = built.simulator
         if source.crowd is not None:
             raise InputError(
                 "gymnasium: expected a mission without people where many are stepped, found some"
@@ -109,17 +117,17 @@ class MissionVectorEnv(VectorEnv[Any, Any, Any]):
         mount = lidar.mount.as_array()
         steps = math.ceil(self.mission.run.time_limit_s / dt_s - 1e-9)
         self._fixed: tuple[Any, ...] = (
-            body.state.copy(),
             limits,
             dt_s,
             body.motion.release_m,
-            np.array([goal.x_m, goal.y_m, goal.tolerance_m]),
             steps,
             np.array([A_STEP, HIT, REACHED]),
             mount,
             fan_of(lidar),
             math.sqrt(lidar.range_var_m2),
         )
+        self._beginnings, self._goals = _episodes(self.mission, built)
+        self._episode = np.zeros(num_envs, dtype=np.int64)
         world = source.world
         self._solid = (body.footprint.outline, world.fixed, world.traffic.others, body.own)
         self._states = np.zeros((num_envs, drive.STATE_SIZE))
@@ -163,6 +171,9 @@ class MissionVectorEnv(VectorEnv[Any, Any, Any]):
             self._pool.shutdown()
 
     def _advance(self) -> None:
+        if len(self._goals) > 1:
+            fresh = np.flatnonzero(self._over)
+            self._episode[fresh] = self.np_random.integers(len(self._goals), size=len(fresh))
         if self._noisy:
             self.np_random.standard_normal(out=self._normals, dtype=np.float32)
         if self._pool is None:
@@ -171,7 +182,6 @@ class MissionVectorEnv(VectorEnv[Any, Any, Any]):
             list(self._pool.map(self._share, *zip(*self._shares, strict=True)))
 
     def _share(self, first: int, last: int) -> None:
-        fresh, *sheet = self._fixed
         arguments: tuple[Any, ...] = (
             first,
             last,
@@ -179,9 +189,11 @@ class MissionVectorEnv(VectorEnv[Any, Any, Any]):
             self._speeds,
             self._counts,
             self._over,
-            fresh,
+            self._episode,
+            self._beginnings,
+            self._goals,
             self._commands,
-            *sheet,
+            *self._fixed,
             self._normals,
             *self._solid,
             np.zeros((1, 3)),
@@ -196,6 +208,25 @@ class MissionVectorEnv(VectorEnv[Any, Any, Any]):
 
     def _observed(self) -> Observations:
         return {self._lidar: self._ranges.astype(np.float32), "goal": self._to_go.astype(np.float32)}
+
+
+def _episodes(mission: Mission, built: Source) -> tuple[FloatArray, FloatArray]:
+    """(P, drive.STATE_SIZE) states of the body to begin with, and (P, 3) goals, x, y and how near.
+
+    P is ``PLACES`` where the mission draws any of them, else 1.
+    """
+    body, world = built.simulator.bodies[0], mission.world
+    states, goals = [body.state.copy()], [goal_of(built.mission)]
+    if world.random_start is not None or world.random_goal is not None:
+        (draw,) = random_places(mission, built.chart)
+        rng = RandomStreams(mission.run.seed).stream("episodes")
+        room_m = goals[0].tolerance_m + body.footprint.radius_m
+        for _ in range(PLACES - 1):
+            start = draw.start(rng)
+            body.carry_to(pose_of(start))
+            states.append(body.state.copy())
+            goals.append(goals[0] if world.random_goal is None else draw.goal(rng, [(start, room_m)]))
+    return np.array(states), np.array([[goal.x_m, goal.y_m, goal.tolerance_m] for goal in goals])
 
 
 def _motion(mission: Any) -> DifferentialDriveConfig:

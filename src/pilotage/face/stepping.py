@@ -106,6 +106,11 @@ class Simulation:
         return [body.name for body in self._built().simulator.bodies]
 
     @property
+    def drawn(self) -> Mission:
+        """The mission with the places that its seed draws."""
+        return self._built().mission
+
+    @property
     def map(self) -> WorldMap:
         """The world's map as it was drawn; what stands there beside it is not on it."""
         return self._built().chart

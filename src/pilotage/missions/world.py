@@ -84,8 +84,9 @@ class WorldConfig(Config):
     """The map, start and goal, and what should not be there.
 
     With ``random_start`` the run begins elsewhere than at ``start``; with no ``start``, on the floor that is
-    meant. Without both it begins where the sheet says, or in its middle. Landmarks in a table take the
-    place of those that the map has.
+    meant. Without both it begins where the sheet says, or in its middle. With ``random_goal`` robots are to
+    go elsewhere than to their ``goal``, which says how near, and whether with a heading. Landmarks in a table
+    take the place of those that the map has.
     """
 
     map: MapChoice
@@ -98,4 +99,5 @@ class WorldConfig(Config):
     people: tuple[ComponentChoice, ...] = ()
     """Plans of those who walk there; no robot is told of them."""
     random_start: RandomPlace | None = None
+    random_goal: RandomPlace | None = None
     kidnaps: tuple[Kidnap, ...] = ()

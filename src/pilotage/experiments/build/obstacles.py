@@ -56,6 +56,29 @@ class Obstacles:
         """Nothing stands there."""
         return cls(np.zeros((0, 4)), np.zeros((0, 3)), [], [])
 
+    @classmethod
+    def fixed(cls, obstacles: Sequence[Obstacle]) -> Obstacles:
+        """Those whose places a mission says.
+
+        Raises
+        ------
+        InputError
+            Where a box has no length.
+        """
+        placed = cls.none()
+        for index, obstacle in enumerate(obstacles):
+            placed = _with_fixed(placed, obstacle, f"world.obstacles.{index}")
+        return placed
+
+    def room_m(self, x_m: float, y_m: float) -> float:
+        """Distance from a place to the nearest of them; none inside one."""
+        for polygon in self.polygons_m:
+            side, to_it = np.roll(polygon, -1, axis=0) - polygon, np.array([x_m, y_m]) - polygon
+            beyond = side[:, 0] * to_it[:, 1] - side[:, 1] * to_it[:, 0]
+            if (beyond >= 0.0).all() or (beyond <= 0.0).all():
+                return 0.0
+        return float(plane.distance_to_nearest(x_m, y_m, self.segments_m, self.circles_m))
+
 
 def place_obstacles(
     obstacles: Sequence[Obstacle],
@@ -81,18 +104,21 @@ def place_obstacles(
     placed = Obstacles.none()
     for index, obstacle in enumerate(obstacles):
         where = f"world.obstacles.{index}"
-        if isinstance(obstacle, CircleObstacle):
-            circle = np.array([[*obstacle.centre_m, obstacle.radius_m]])
-            placed = _with(placed, circle=circle)
-        elif isinstance(obstacle, BoxObstacle):
-            placed = _with(placed, [_box_between(obstacle, where)])
+        if isinstance(obstacle, CircleObstacle | BoxObstacle):
+            placed = _with_fixed(placed, obstacle, where)
         elif planned is not None and planned.shape[0] > 1:
             drawn = _draw_across(obstacle, world, placed, start, goal, planned, body_radius_m, rng, where)
             placed = _with(placed, *drawn)
-        clear = plane.distance_to_nearest(start.x_m, start.y_m, placed.segments_m, placed.circles_m)
-        if clear < body_radius_m:
+        if placed.room_m(start.x_m, start.y_m) < body_radius_m:
             raise InputError(f"{where}: expected the start to be free, found the obstacle standing on it")
     return placed
+
+
+def _with_fixed(placed: Obstacles, obstacle: Obstacle, where: str) -> Obstacles:
+    """With one more, where its place is said."""
+    if isinstance(obstacle, CircleObstacle):
+        return _with(placed, circle=np.array([[*obstacle.centre_m, obstacle.radius_m]]))
+    return _with(placed, [_box_between(obstacle, where)]) if isinstance(obstacle, BoxObstacle) else placed
 
 
 def _with(

@@ -16,8 +16,10 @@ from pilotage.kernels.grids.blocked_distance import distance_to_blocked
 from pilotage.maps.floor import SNAP_M, Floor
 from pilotage.maps.pieces import beside_edge, meant_piece
 from pilotage.maps.world_map import WorldMap
-from pilotage.missions.places import PoseConfig
+from pilotage.missions.places import GoalConfig, PoseConfig
 
+Apart = Sequence[tuple[PoseConfig | GoalConfig, float]]
+"""Places, and how far one has to be from each [m]."""
 DRAWS_AT_ONCE = 1000
 MAX_DRAWS = 100_000
 EASY_M, STEP_M = 0.1, 0.15
@@ -36,10 +38,7 @@ def random_pose(
     InputError
         Where no place with that clearance is reached, or nothing is found.
     """
-    found = OpenFloor(chart, clearance_m, reachable_from).draw(rng)
-    if found is None:
-        raise InputError(f"random place: found none with {clearance_m:g} m of clearance; ask for less")
-    return found
+    return OpenFloor(chart, clearance_m, reachable_from).pose(rng)
 
 
 class OpenFloor:
@@ -49,6 +48,8 @@ class OpenFloor:
 
     Parameters
     ----------
+    clearance_m
+        Kept from walls by what is drawn.
     about
         Without a place: the floor nearest to this one, which may be beside a wall or in one. Whether anybody
         can get there its task tells, in its own words.
@@ -66,7 +67,7 @@ class OpenFloor:
         reachable_from: PoseConfig | None,
         about: tuple[float, float] | None = None,
     ) -> None:
-        self._chart, self._clearance_m = chart, clearance_m
+        self._chart, self.clearance_m = chart, clearance_m
         self._field = chart.field
         self._regions, _ = scipy.ndimage.label(self._field.distance_m >= clearance_m)
         if reachable_from is None:
@@ -87,7 +88,7 @@ class OpenFloor:
     def easy(self) -> BoolArray:
         """(rows, columns) of it what is beside its largest part whose passages have ``EASY_M`` more room."""
         home = self._regions == self._home
-        pieces, count = scipy.ndimage.label(home & (self._field.distance_m >= self._clearance_m + EASY_M))
+        pieces, count = scipy.ndimage.label(home & (self._field.distance_m >= self.clearance_m + EASY_M))
         if not count:
             return np.asarray(home)
         largest = pieces == 1 + int(np.argmax(np.bincount(pieces.ravel())[1:]))
@@ -99,7 +100,7 @@ class OpenFloor:
         home = np.asarray(self._regions == self._home)
         inside = None if first is None else (first.x_m, first.y_m)
         try:
-            cells = Floor.of(self._chart, self._clearance_m, inside_xy_m=inside)
+            cells = Floor.of(self._chart, self.clearance_m, inside_xy_m=inside)
         except InputError:
             return home
         column, row = (
@@ -148,10 +149,27 @@ class OpenFloor:
         row, column = np.where(inside[:, None], at, 0).T
         return np.asarray(nodes[row, column] * inside)
 
+    def pose(self, rng: np.random.Generator, apart_from: Apart = ()) -> PoseConfig:
+        """Draw a pose, as ``draw``.
+
+        Raises
+        ------
+        InputError
+            Where nothing is found.
+        """
+        found = self.draw(rng, apart_from)
+        if found is None:
+            raise InputError(
+                f"random place: found none with {self.clearance_m:g} m of clearance"
+                + (" that is apart from the others'" if apart_from else "")
+                + "; ask for less"
+            )
+        return found
+
     def draw(
         self,
         rng: np.random.Generator,
-        apart_from: Sequence[tuple[PoseConfig, float]] = (),
+        apart_from: Apart = (),
         part: BoolArray | None = None,
     ) -> PoseConfig | None:
         """Draw a pose on a part of it, so far from each of some others; None where nothing is found."""
@@ -166,7 +184,7 @@ class OpenFloor:
                 fit &= np.hypot(drawn[:, 0] - place.x_m, drawn[:, 1] - place.y_m) >= spacing_m
             for index in np.flatnonzero(fit).tolist():
                 x, y, theta = drawn[index].tolist()
-                if room_m(self._chart, x, y, self._clearance_m) >= self._clearance_m:
+                if room_m(self._chart, x, y, self.clearance_m) >= self.clearance_m:
                     # What is drawn next goes on behind this one, as if they had been drawn one by one.
                     rng.bit_generator.state = before
                     rng.uniform(low, high, (index + 1, 3))

@@ -12,11 +12,12 @@ from pilotage.core.errors import InputError
 from pilotage.core.random import RandomStreams
 from pilotage.core.types import Pose2
 from pilotage.experiments.build.open_floor import OpenFloor, random_pose, room_m
+from pilotage.experiments.build.random_places import RandomPlaces
 from pilotage.experiments.build.robots import footprint_of
 from pilotage.maps.occupancy_grid import UNKNOWN
 from pilotage.maps.world_map import WorldMap
 from pilotage.missions.mission import Mission
-from pilotage.missions.places import Kidnap, PoseConfig
+from pilotage.missions.places import GoalConfig, Kidnap, PoseConfig
 from pilotage.missions.robot import RobotConfig
 from pilotage.models.footprint import Footprint
 
@@ -52,41 +53,86 @@ def settle_places(mission: Mission, chart: WorldMap, about: tuple[float, float] 
     """Return the mission with all its places known, so that it can be recorded and run again as it is.
 
     A random start without ``world.start`` is drawn on the floor that is meant. A team's starts are drawn on
-    the floor of the place that the task is ``about``, if it is about one.
+    the floor of the place that the task is ``about``, if it is about one. Goals are drawn apart, each on the
+    floor of its robot's start.
     """
     if mission.team.size is not None:
         mission = _with_drawn_starts(mission, chart, about)
     world = mission.world
     streams = RandomStreams(mission.run.seed)
-    if world.random_start is None:
-        starts = [start_pose(mission, index, chart) for index in range(len(mission.members))]
-        if all(kidnap.to is not None for kidnap in world.kidnaps):
-            return mission if mission.robots or world.start is not None else _started(mission, starts)
-        given: list[PoseConfig | None] = [*starts]
-    else:
-        rng, clearance_m = streams.stream("start"), world.random_start.clearance_m
-        given = [
-            mission.start_of(robot) if chart.markings is None else start_pose(mission, index, chart)
-            for index, robot in enumerate(mission.members)
-        ]
-        starts = [random_pose(chart, start, clearance_m, rng) for start in given]
+    draws = random_places(mission, chart)
+    starts = _starts(mission, draws, streams.stream("start"))
     rng = streams.stream("kidnap")
     kidnaps = tuple(
-        kidnap if kidnap.to is not None else _carried(kidnap, chart, given[kidnap.robot], rng)
+        kidnap if kidnap.to is not None else _carried(kidnap, chart, draws[kidnap.robot].given, rng)
         for kidnap in world.kidnaps
     )
-    settled = world.model_copy(update={"random_start": None, "kidnaps": kidnaps})
-    return _started(mission.model_copy(update={"world": settled}), starts)
+    if world.random_start is not None or not (mission.robots or world.start is not None):
+        mission = _with(mission, "start", starts)
+    if world.random_goal is not None:
+        mission = _with(mission, "goal", _goals(mission, draws, starts, streams.stream("goal")))
+    settled = {"random_start": None, "random_goal": None, "kidnaps": kidnaps}
+    return mission.model_copy(update={"world": mission.world.model_copy(update=settled)})
 
 
-def _started(mission: Mission, starts: Sequence[PoseConfig]) -> Mission:
-    """The mission with its starts where they belong: the one robot's in the world, else each robot's own."""
-    if not mission.robots and mission.robot.start is None:
-        return mission.model_copy(update={"world": mission.world.model_copy(update={"start": starts[0]})})
+def random_places(mission: Mission, chart: WorldMap) -> list[RandomPlaces]:
+    """What draws each robot's start and goal.
+
+    Raises
+    ------
+    InputError
+        As ``start_pose``.
+    """
+    world = mission.world
+    draws_start = world.random_start is not None and chart.markings is None
+    return [
+        RandomPlaces(
+            world,
+            chart,
+            mission.start_of(robot) if draws_start else start_pose(mission, index, chart),
+            mission.goal_of(robot),
+        )
+        for index, robot in enumerate(mission.members)
+    ]
+
+
+def _starts(mission: Mission, draws: Sequence[RandomPlaces], rng: np.random.Generator) -> list[PoseConfig]:
+    """A start for each robot: those that are drawn, apart from the others before."""
+    starts: list[PoseConfig] = []
+    radii_m = _radii_m(mission)
+    for draw, own_m in zip(draws, radii_m, strict=True):
+        others = [(start, own_m + ROOM_M + other_m) for start, other_m in zip(starts, radii_m, strict=False)]
+        starts.append(draw.start(rng, others))
+    return starts
+
+
+def _goals(
+    mission: Mission, draws: Sequence[RandomPlaces], starts: Sequence[PoseConfig], rng: np.random.Generator
+) -> list[GoalConfig]:
+    """A goal for each robot: none where it begins, nor where another one that is there leaves it no room."""
+    goals: list[GoalConfig] = []
+    rooms_m = [
+        draw.goal_like.tolerance_m + radius_m for draw, radius_m in zip(draws, _radii_m(mission), strict=True)
+    ]
+    for draw, start, own_m in zip(draws, starts, rooms_m, strict=True):
+        others = [(goal, own_m + other_m) for goal, other_m in zip(goals, rooms_m, strict=False)]
+        goals.append(draw.goal(rng, [(start, own_m), *others]))
+    return goals
+
+
+def _radii_m(mission: Mission) -> list[float]:
+    where = "robots.{}" if mission.robots else "robot"
+    return [footprint_of(robot, where.format(index)).radius_m for index, robot in enumerate(mission.members)]
+
+
+def _with(mission: Mission, place: str, drawn: Sequence[PoseConfig | GoalConfig]) -> Mission:
+    """The mission with its starts, or goals, where they belong: one robot's in the world, else its own."""
+    if not mission.robots and getattr(mission.robot, place) is None:
+        return mission.model_copy(update={"world": mission.world.model_copy(update={place: drawn[0]})})
     if not mission.robots:
-        return mission.model_copy(update={"robot": mission.robot.model_copy(update={"start": starts[0]})})
+        return mission.model_copy(update={"robot": mission.robot.model_copy(update={place: drawn[0]})})
     robots = tuple(
-        robot.model_copy(update={"start": start}) for robot, start in zip(mission.robots, starts, strict=True)
+        robot.model_copy(update={place: one}) for robot, one in zip(mission.robots, drawn, strict=True)
     )
     return mission.model_copy(update={"robots": robots})
 
@@ -104,7 +150,7 @@ def _with_drawn_starts(mission: Mission, chart: WorldMap, about: tuple[float, fl
     """
     rng = RandomStreams(mission.run.seed).stream("starts")
     near = mission.world.start
-    radii_m = [footprint_of(robot, f"robots.{k}").radius_m for k, robot in enumerate(mission.robots)]
+    radii_m = _radii_m(mission)
     placed: list[tuple[PoseConfig, float]] = [
         (robot.start, radius_m)
         for robot, radius_m in zip(mission.robots, radii_m, strict=True)

@@ -22,12 +22,13 @@ def step_environments(
     speeds: FloatArray,
     counts: IntArray,
     over: BoolArray,
-    fresh: FloatArray,
+    episode: IntArray,
+    beginnings: FloatArray,
+    goals: FloatArray,
     commands: FloatArray,
     limits: FloatArray,
     dt: float,
     release: float,
-    goal: FloatArray,
     most_steps: int,
     prices: FloatArray,
     mount: FloatArray,
@@ -51,15 +52,16 @@ def step_environments(
     Parameters
     ----------
     states
-        (N, drive.STATE_SIZE); ``fresh`` (drive.STATE_SIZE,) is that of the start.
+        (N, drive.STATE_SIZE).
+    episode
+        (N,) which of ``beginnings`` (P, drive.STATE_SIZE), states at the start, and of ``goals`` (P, 3), x, y
+        and the radius within which it is reached, each has.
     speeds, commands
         (N, 2) forward speed and turn rate, driven and asked for.
     counts
         (N,) steps since the beginning, which counts as one.
     limits
         (4,) most speed and turn rate, and how much both may change in a step.
-    goal
-        x, y and the radius within which it is reached.
     prices
         (3,) reward of a step, a collision and an arrival; progress has its metres.
     normals
@@ -76,7 +78,7 @@ def step_environments(
         begun = over[i]
         before = to_go[i, 0]
         if begun:
-            state[:] = fresh
+            state[:] = beginnings[episode[i]]
             speeds[i] = 0.0
             counts[i] = 0
         else:
@@ -98,6 +100,7 @@ def step_environments(
             for k in range(row.shape[0]):
                 if row[k] < max_range:
                     row[k] = min(max(row[k] + std * normals[i, k], 0.0), max_range)
+        goal = goals[episode[i]]
         dx, dy = goal[0] - state[X], goal[1] - state[Y]
         distance = math.hypot(dx, dy)
         to_go[i, 0], to_go[i, 1] = distance, wrap(math.atan2(dy, dx) - state[THETA])

@@ -8,7 +8,7 @@ from enum import Enum, auto
 import numpy as np
 
 from pilotage.core.angles import wrap_array_to_pi
-from pilotage.core.types import FloatArray
+from pilotage.core.types import BoolArray, FloatArray, IntArray
 
 STANDS = 0.02
 """A clock slower than this stands."""
@@ -33,9 +33,9 @@ class Reference:
 
     def __init__(self, rows: FloatArray, dt_s: float) -> None:
         self._rows, self._dt_s = rows, dt_s
-        drives = np.append(rows[:, 3] != 0.0, False)
-        changes = np.flatnonzero(drives[1:] != drives[:-1]) + 1
-        self._corners = np.union1d(changes, [len(rows)])
+        direction = np.sign(rows[:, 3])
+        self._corners = _changes(direction != 0.0)
+        self._turns = _changes(direction)
         self._at, self._before, self.rate = 0.0, 0.0, 1.0
         ahead_m = dt_s * np.abs(rows[::-1, 3]).cumsum()[::-1]
         self._to_go_m = np.append(ahead_m, 0.0)
@@ -55,17 +55,14 @@ class Reference:
 
         Of a turn on the spot as much as is made in ``within_s``.
         """
-        first = int(self._at)
-        rows = self._rows[max(first - 1, 0) :]
-        speeds = rows[1:, 3] if first else rows[:, 3]
-        if not len(speeds):
+        if self.done:
             return self.pose()[None, :]
-        direction = float(np.sign(speeds[0]))
-        if direction == 0.0:
-            count = min(int(np.argmax(np.append(speeds, 1.0) != 0.0)), math.ceil(within_s / self._dt_s))
+        first = int(self._at)
+        count = _next(self._turns, first) - first
+        if self._rows[first, 3] == 0.0:
+            count = min(count, math.ceil(within_s / self._dt_s))
         else:
-            count = int(np.argmax(np.append(speeds * direction, -1.0) <= 0.0))
-            along_m = self._dt_s * np.abs(speeds[:count]).cumsum()
+            along_m = self._dt_s * np.abs(self._rows[first : first + count, 3]).cumsum()
             count = min(count, int(np.searchsorted(along_m, within_m)) + 1)
         return np.vstack([self.pose(), self._rows[first : first + count, :3]])
 
@@ -80,8 +77,7 @@ class Reference:
     def hold(self) -> FloatArray:
         """(6,) as ``step``, but its clock stands: pose, no speeds, and the way to go."""
         self._before = self._at
-        to_go_m = np.interp(self._at, np.arange(len(self._to_go_m)), self._to_go_m)
-        return np.array([*self.pose(), 0.0, 0.0, to_go_m])
+        return np.array([*self.pose(), 0.0, 0.0, self._rest_m()])
 
     def step(self) -> FloatArray:
         """Move on by a step of its clock: (6,) pose, speed, turn rate and the way to go from there.
@@ -91,16 +87,21 @@ class Reference:
         row = self._rows[int(self._at)]
         v, w = self.rate * row[3], self.rate * row[4]
         self._before = self._at
-        corner = float(self._corners[np.searchsorted(self._corners, self._at, side="right")])
+        corner = float(_next(self._corners, self._at))
         self._at = min(self._at + self.rate, corner)
         if corner - self._at < STANDS:
             self._at = corner
-        to_go_m = np.interp(self._at, np.arange(len(self._to_go_m)), self._to_go_m)
-        return np.array([*self.pose(), v, w, to_go_m])
+        return np.array([*self.pose(), v, w, self._rest_m()])
 
     def stay(self) -> None:
         """Take the last step back: it was not driven. The clock starts anew."""
         self._at, self.rate = self._before, 0.0
+
+    def _rest_m(self) -> float:
+        """The way to go from where it is."""
+        first = int(self._at)
+        here_m, after_m = self._to_go_m[first], self._to_go_m[min(first + 1, len(self._rows))]
+        return float(here_m + (self._at - first) * (after_m - here_m))
 
     def pose(self) -> FloatArray:
         """(3,) where it is: a row's pose at the end of its step, before the first one the first row's."""
@@ -113,3 +114,13 @@ class Reference:
             pose[:2] += share * (following[:2] - pose[:2])
             pose[2:] = wrap_array_to_pi(pose[2:] + share * wrap_array_to_pi(following[2:] - pose[2:]))
         return pose
+
+
+def _changes(values: FloatArray | BoolArray) -> IntArray:
+    """Rows whose value is another than the one before has, and the number of rows."""
+    return np.append(np.flatnonzero(values[1:] != values[:-1]) + 1, len(values))
+
+
+def _next(rows: IntArray, at: float) -> int:
+    """The first of sorted rows that is beyond a place."""
+    return int(rows[np.searchsorted(rows, at, side="right")])

@@ -109,7 +109,7 @@ def laid_out(
     middle = states[:-1, 2] + 0.5 * turned
     sign = np.where(delta[:, 0] * np.cos(middle) + delta[:, 1] * np.sin(middle) >= 0.0, 1.0, -1.0)
     cuts = [0, *(np.flatnonzero(np.diff(sign)) + 1).tolist(), len(sign)]
-    rows: list[list[float]] = []
+    rows = [np.empty((0, 5))]
     heading = np.unwrap(states[:, 2])
     for first, last in pairwise(cuts):
         s = np.concatenate([[0.0], np.cumsum(length[first:last])])
@@ -124,12 +124,12 @@ def laid_out(
         x, y, theta = (float(column[0]) for column in columns)
         # At rest wheels turn to the side that is asked for: backwards the robot then turns to the other one.
         first_w = math.copysign(1e-3, curvature[0]) if abs(curvature[0]) > ABRUPT_PER_M else 0.0
-        rows += [[x, y, wrap_to_pi(theta), 0.0, first_w]] * round(pause_s / dt_s)
+        rows.append(np.tile([x, y, wrap_to_pi(theta), 0.0, first_w], (round(pause_s / dt_s), 1)))
         limit = _limits(s, curvature, speed_m_s, curvature_rate_per_m_s, turn_rate_rad_s)
-        rows += _timed(
-            s, columns, curvature, limit, sign[first], acceleration_m_s2, curvature_rate_per_m_s, dt_s
+        rows.append(
+            _timed(s, columns, curvature, limit, sign[first], acceleration_m_s2, curvature_rate_per_m_s, dt_s)
         )
-    return np.array(rows).reshape(-1, 5)
+    return np.vstack(rows)
 
 
 def _limits(
@@ -157,8 +157,8 @@ def _timed(
     acceleration_m_s2: float,
     rate: float,
     dt_s: float,
-) -> list[list[float]]:
-    """The rows of one piece, at equal steps of time."""
+) -> FloatArray:
+    """(N, 5) rows of one piece, at equal steps of time."""
     v2 = limit**2
     v2[0] = v2[-1] = 0.0
     gain = 2.0 * acceleration_m_s2 * np.diff(s)
@@ -184,4 +184,4 @@ def _timed(
     inside = np.minimum(high, t_s[-1]) - np.maximum(low, 0.0)
     mean = (np.interp(high, t_s, cumulated) - np.interp(low, t_s, cumulated)) / np.maximum(inside, 1e-9)
     w = mean * speed
-    return np.column_stack([px[1:], py[1:], wrap_array_to_pi(ptheta[1:]), speed, w]).tolist()  # type: ignore[no-any-return]
+    return np.column_stack([px[1:], py[1:], wrap_array_to_pi(ptheta[1:]), speed, w])

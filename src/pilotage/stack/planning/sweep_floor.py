@@ -116,6 +116,8 @@ def surely_covered(floor: Floor, trail: FloatArray, width_m: float, overlap_m: f
         (N, 3) x, y and their standard deviation [m].
     """
     found = np.zeros_like(floor.reachable)
+    if not len(trail):  # a sweep that ended before its first pass
+        return found
     unsure_m = np.maximum(trail[:-1, 2], trail[1:, 2])
     usual_m = max(float(np.median(trail[:, 2])), OVERLAP_SHARE * overlap_m)
     radius_m = 0.5 * width_m - 2.0 * np.maximum(0.0, unsure_m - 2.0 * usual_m)

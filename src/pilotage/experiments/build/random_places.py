@@ -1,0 +1,79 @@
+"""Where a robot begins and where it is to go, as far as a seed says."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from pilotage.core.errors import InputError
+from pilotage.experiments.build.obstacles import Obstacles
+from pilotage.experiments.build.open_floor import Apart, OpenFloor
+from pilotage.maps.world_map import WorldMap
+from pilotage.missions.places import GoalConfig, PoseConfig
+from pilotage.missions.world import WorldConfig
+
+MAX_DRAWS = 1000
+
+
+class RandomPlaces:
+    """Draws places for one robot, again and again on the same floor.
+
+    Attributes
+    ----------
+    given
+        Where it begins where no start is drawn, else what its floor is connected to; None: the floor that is
+        meant.
+    goal_like
+        Whose tolerances a drawn goal has; a heading is drawn where this one has one.
+    """
+
+    def __init__(
+        self, world: WorldConfig, chart: WorldMap, given: PoseConfig | None, goal: GoalConfig | None
+    ) -> None:
+        self._world, self._chart = world, chart
+        self.given, self.goal_like = given, goal or GoalConfig(x_m=0.0, y_m=0.0)
+        self._obstacles = Obstacles.fixed(world.obstacles)
+
+    def start(self, rng: np.random.Generator, apart_from: Apart = ()) -> PoseConfig:
+        """A starting pose; the given one where the world draws none.
+
+        Raises
+        ------
+        InputError
+            Where the floor has none so far from others.
+        """
+        if self._world.random_start is not None:
+            return self._free(self._start_floor, rng, apart_from)
+        assert self.given is not None, "what is not drawn is given"
+        return self.given
+
+    def goal(self, rng: np.random.Generator, apart_from: Apart) -> GoalConfig:
+        """A goal, where the world draws them.
+
+        Raises
+        ------
+        InputError
+            Where the floor has none so far from others.
+        """
+        drawn = self._free(self._goal_floor, rng, apart_from)
+        heading = {} if self.goal_like.theta_rad is None else {"theta_rad": drawn.theta_rad}
+        return self.goal_like.model_copy(update={"x_m": drawn.x_m, "y_m": drawn.y_m, **heading})
+
+    def _free(self, floor: OpenFloor, rng: np.random.Generator, apart_from: Apart) -> PoseConfig:
+        """A pose with room beside what stands there unexpectedly, too."""
+        for _ in range(MAX_DRAWS):
+            drawn = floor.pose(rng, apart_from)
+            if self._obstacles.room_m(drawn.x_m, drawn.y_m) >= floor.clearance_m:
+                return drawn
+        raise InputError("world.obstacles: expected room beside them for a random place, found none")
+
+    @cached_property
+    def _start_floor(self) -> OpenFloor:
+        assert self._world.random_start is not None, "asked only then"
+        return OpenFloor(self._chart, self._world.random_start.clearance_m, self.given)
+
+    @cached_property
+    def _goal_floor(self) -> OpenFloor:
+        assert self._world.random_goal is not None, "asked only then"
+        return OpenFloor(self._chart, self._world.random_goal.clearance_m, self.given)
