@@ -168,3 +168,53 @@ def test_alone_on_its_floor_it_gives_way_to_who_walks(seed: int) -> None:
     metrics = run_mission(mission_of(values, seed=seed), save=False).metrics
     assert metrics["collisions"] == 0
     assert metrics["success"], metrics["reason"]
+
+
+@pytest.mark.parametrize(("taken", "arrives"), [("goal", False), ("way", True)])
+def test_before_what_stands_it_gets_around_or_gives_up_and_says_why(taken: str, arrives: bool) -> None:
+    """With its goal taken it backed out and came again until its time was up, having driven enough each time.
+
+    Who has no mapper forgot one side of a thing when it saw the other, and went to and fro.
+    """
+    x_m, y_m, length_m, width_m = (6.0, 1.5, 0.6, 0.6) if taken == "goal" else (3.7, 2.2, 0.6, 2.6)
+    values = {
+        "mission": "taken",
+        "world": {
+            "map": {
+                "map": "hall",
+                "walls_m": [[0, 0, 7.4, 0], [7.4, 0, 7.4, 4.4], [7.4, 4.4, 0, 4.4], [0, 4.4, 0, 0]],
+            },
+            "start": {"x_m": 1.0, "y_m": 2.2, "theta_rad": 0.0},
+            "goal": {"x_m": 6.0, "y_m": 1.5, "tolerance_m": 0.3},
+            "obstacles": [
+                {
+                    "kind": "box",
+                    "from_m": [x_m - 0.5 * length_m, y_m],
+                    "to_m": [x_m + 0.5 * length_m, y_m],
+                    "thickness_m": width_m,
+                }
+            ],
+        },
+        "robot": {
+            "footprint": {"radius_m": 0.25},
+            "motion": {"name": "differential-drive", "max_speed_m_s": 0.8},
+            "sensors": {
+                "odometry": {"name": "wheel-odometry"},
+                "lidar": {"name": "lidar", "beams": 360, "field_of_view_rad": 6.283, "max_range_m": 10.0},
+            },
+        },
+        "stack": {
+            "initial": {"x_var_m2": 1e-4, "y_var_m2": 1e-4, "theta_var_rad2": 1e-4},
+            "localizer": "ekf-walls",
+            "navigator": "maneuver",
+            "planner": "theta-star",
+            "smoother": "shortcut",
+        },
+        "run": {"time_limit_s": 300.0},
+    }
+    metrics = run_mission(mission_of(values, seed=1), save=False).metrics
+    assert metrics["success"] is arrives, metrics["reason"]
+    assert metrics["collisions"] == 0
+    if not arrives:
+        assert str(metrics["reason"]).startswith("stuck: something stands in its way: the goal (6, 1.5) is")
+        assert float(str(metrics["duration_s"])) < 250.0

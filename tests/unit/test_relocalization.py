@@ -162,6 +162,19 @@ def test_a_trial_that_the_map_cannot_judge_ends() -> None:
     assert again.trial is None
 
 
+def test_scans_a_metre_apart_end_a_trial_as_others_do() -> None:
+    """After five metres, with five scans of fifteen, it was given up: slow lasers were never found again."""
+    field, bounds_m = field_of(furnished(), cells=False)
+    again = Relocalization(field, bounds_m)
+    again.trial = Trial()
+    for _ in range(TRIAL_SCANS - 1):
+        again.move(OdometryIncrement(1.0, 0.0))
+        assert again.passed(0.8, 1.0, 0.8) is None
+        assert again.trial is not None
+    again.move(OdometryIncrement(1.0, 0.0))
+    assert again.passed(0.8, 1.0, 0.8) is True
+
+
 def test_beams_are_weighed_alone_as_together() -> None:
     field, _ = field_of(furnished(), cells=True)
     pose = np.array([2.0, 3.5, 0.2])

@@ -66,6 +66,7 @@ class SweepTask(WatchedTask):
         place = start.x_m, start.y_m
         floor = Floor.of(setting.chart, radius_m, cell_m, place, exact=True)
         # By two cells less than a pass reaches: cells tell where a passage becomes narrow no better.
+        self._whole = floor
         self._floor = floor.roomy(config.spare_m, 0.5 * self._width_m - 2.0 * floor.cell_m, place)
         self.events += cut_off(floor)
         self._swept: BoolArray = np.zeros_like(self._floor.reachable)
@@ -93,7 +94,9 @@ class SweepTask(WatchedTask):
         metrics |= driven
         floor, swept = self._floor, self._share(self._floor.reachable)
         within_reach = sweepable(floor, self._width_m)
-        area_m2 = np.count_nonzero(within_reach) * floor.cell_m**2
+        # Who squeezes to more than is asked for needs a path for that, too.
+        taken = within_reach | (sweepable(self._whole, self._width_m) & self._swept)
+        area_m2 = np.count_nonzero(taken) * floor.cell_m**2
         metrics |= {
             "floor_apart_fraction": floor.apart_fraction,
             "swept_fraction": swept,

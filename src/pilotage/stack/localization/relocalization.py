@@ -30,7 +30,8 @@ TRIAL_SCANS, TRIAL_M = 15, 1.5
 TRIAL_WEIGHT = 5.0
 """and readings of so many full scans: on open ground a few of each say next to nothing;"""
 LONGEST_TRIAL_M = 5.0
-"""Where the map says so little that a trial does not end, the search begins anew."""
+"""Where the map says so little that a trial does not end, the search begins anew: after so much path and as
+many scans as would have been enough, if they said something, or so much path without any."""
 FITTING = 0.85
 """this share of what is usual; less, and it is given up."""
 LEAST_USUAL = 0.6
@@ -46,12 +47,19 @@ STDS = np.array([0.1, 0.1, 0.02])
 @dataclass(slots=True)
 class Trial:
     """A place that is being tried: scans, what they count in all (readings over those of full ones), what of
-    that fits, and the path since."""
+    that fits, the path since, and that since the last of them."""
 
     scans: int = 0
     weight: float = 0.0
     fitting: float = 0.0
     path_m: float = 0.0
+    unseen_m: float = 0.0
+
+    @property
+    def says_nothing(self) -> bool:
+        """Whether it will not end."""
+        path_m = self.path_m if self.scans >= TRIAL_SCANS else self.unseen_m
+        return path_m > LONGEST_TRIAL_M
 
 
 class Relocalization:
@@ -95,7 +103,8 @@ class Relocalization:
             self._trusted, self._path_m = carried(self._trusted, *moved), self._path_m + path_m
         if self.trial is not None:
             self.trial.path_m += path_m
-            if self.trial.path_m > LONGEST_TRIAL_M:
+            self.trial.unseen_m += path_m
+            if self.trial.says_nothing:
                 self.trial = None
 
     def see(self, points: FloatArray) -> None:
@@ -142,7 +151,7 @@ class Relocalization:
         trial = self.trial
         if trial is None:
             return None
-        trial.scans += 1
+        trial.scans, trial.unseen_m = trial.scans + 1, 0.0
         trial.weight += weight
         trial.fitting += weight * at_wall_share
         enough = trial.scans >= TRIAL_SCANS and trial.weight >= TRIAL_WEIGHT and trial.path_m >= TRIAL_M

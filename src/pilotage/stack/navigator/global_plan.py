@@ -93,6 +93,7 @@ class GlobalPlan:
         self.turns_first = False
         self._least_clearance_m = least_clearance_m
         self._planner = planner
+        self.takes_long = getattr(planner, "TAKES_LONG", False)
         self.turns_on_the_spot = as_planned and getattr(planner, "TURNS_ON_THE_SPOT", False)
         least_m = 0.0 if robot is None else robot.motion.least_turning_radius_m
         if self.turns_on_the_spot and least_m > 0.0:

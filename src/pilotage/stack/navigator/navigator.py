@@ -6,9 +6,11 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
 from pilotage.core.angles import wrap_to_pi
 from pilotage.core.errors import InputError
-from pilotage.core.types import Goal, Pose2, Twist
+from pilotage.core.types import FloatArray, Goal, Pose2, Twist
 from pilotage.stack.control.controller import Controller
 from pilotage.stack.control.escape import Escape
 from pilotage.stack.control.local.role import LocalController
@@ -17,7 +19,7 @@ from pilotage.stack.interface import Belief, StackStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import TaskKnowledge
 from pilotage.stack.localization.heading_filter import HeadingFilter
-from pilotage.stack.localization.localizer import Localizer
+from pilotage.stack.localization.localizer import Abilities, Localizer
 from pilotage.stack.mapping.mapper import Mapper
 from pilotage.stack.patrol.task import PatrolTask
 from pilotage.stack.perception.unexplained import UnexplainedReturns
@@ -28,6 +30,8 @@ DISC_HINT = " (for the disc around the robot; navigator maneuver and planner hyb
 """Where a disc finds no path, and the body is none."""
 AROUND = ", which it knows no way around (navigators maneuver and goal plan one)"
 """Of a robot that plans nothing anew, before what stands in its way."""
+SIGMAS = 3.0
+"""Of its start, by which who never corrects that may be wrong."""
 TURN_GAIN_PER_S, TURN_RATE_RAD_S = 2.0, 0.8
 """Turned on the spot no faster than this, slower towards the end."""
 
@@ -118,6 +122,23 @@ def localizer_of(parts: Parts, needed_by: str) -> Localizer:
             f"navigator '{needed_by}': expected stack.localizer, or run.oracles: [localizer], found neither"
         )
     return parts.localizer
+
+
+def check_finds_place(
+    localizer: Localizer, start: Belief, places_m: FloatArray, most_m: float, needed_by: str, what: str
+) -> None:
+    """Refuse a start so vague that places (P, 2) are missed by more, where no sensor mends it."""
+    if Abilities.of(localizer).on_map:
+        return
+    away_m = float(np.hypot(*(places_m - (start.pose.x_m, start.pose.y_m)).T).max())
+    position_m, heading_rad = (SIGMAS * math.sqrt(start.cov.diagonal()[of].max()) for of in ([0, 1], [2]))
+    wrong_m = math.hypot(position_m, away_m * heading_rad)
+    if wrong_m > most_m:
+        raise InputError(
+            f"navigator '{needed_by}': expected a localizer that finds its place on the map, found one that "
+            f"keeps what it is wrong by at the start, up to {wrong_m:.1f} m at the farthest {what}; take "
+            "stack.localizer: laser, or a stack.initial of smaller variances"
+        )
 
 
 def check_keeps_time(parts: Parts, needed_by: str) -> None:

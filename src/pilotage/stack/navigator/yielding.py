@@ -28,8 +28,8 @@ class YieldingConfig(Config):
     back_m: Positive = 2.0
     progress_m: Positive = 3.0
     """Having come so much farther along its plan it has got past."""
-    most_tries: int = Field(default=20, ge=1)
-    """So often it tries where nobody else drives before it gives up."""
+    most_tries: int = Field(default=10, ge=1)
+    """So often it tries where nobody else drives or walks before it gives up, if it gets no farther."""
 
 
 class Act(Enum):
@@ -64,11 +64,6 @@ class Yielding:
     def is_held(self) -> bool:
         """Whether it is held up."""
         return self._held_s > 0.0
-
-    @property
-    def gives_up(self) -> bool:
-        """Whether it has tried often enough."""
-        return self.tries > self._config.most_tries
 
     def step(self, rate: float, moved_m: float, *, backs: bool) -> Act:
         """Take in how fast the path's clock ran, and how far that led; what to do after it."""

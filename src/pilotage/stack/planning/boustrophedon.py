@@ -32,6 +32,10 @@ MOST_CELLS_ORDERED = 100_000
 LITTLE = 0.05
 """Share of the floor: where no more is to be swept, detours from the straight path may be shorter."""
 
+BESIDE_M = 0.03
+"""A body keeps so much beside itself where there is room: its lasers stop it a centimetre before what they
+show, which is some millimetres of noise nearer than it is, and nobody is on his path to the millimetre."""
+
 
 class BoustrophedonConfig(Config):
     """The width that a pass sweeps, and the clearance that the robot's centre keeps."""
@@ -94,7 +98,7 @@ class BoustrophedonPlanner:
         if status is not PlanStatus.FOUND:
             return failure(status, why, time.perf_counter() - began)
         try:
-            keeping = Keeping(radius_m, clearance_m, start)
+            keeping = Keeping(radius_m, max(clearance_m, radius_m + BESIDE_M), start)
             sought = whole_floor(request.field, keeping, width_m, self._config.overlap_m)
             if request.trail is not None:
                 sought = rest_of(sought, request.trail, width_m, self._config.enough)

@@ -18,6 +18,9 @@ from pilotage.stack.planning.sweep_room import Keeping, path_floor
 STEP_M = 0.002
 """Stretches of a trail on which its radius differs by less are taken together, with the least of it."""
 
+OVERLAP_SHARE = 0.25
+"""Of the overlap: two such standard deviations are what passes overlap for to either side."""
+
 
 @dataclass(frozen=True, eq=False)
 class Sought:
@@ -48,7 +51,7 @@ def whole_floor(field: DistanceField, keeping: Keeping, width_m: float, overlap_
     radius_m, inside = keeping.radius_m, keeping.start_xy_m
     cell_m = pass_cell_m(width_m, radius_m)
     floor = Floor.of_field(field, field.bounds_m, radius_m, cell_m, inside, exact=True)
-    inner = path_floor(field, keeping, width_m)
+    inner = path_floor(field, keeping, width_m, floor)
     rim = sweepable(floor, width_m) & ~floor.reachable
     must = floor.reachable & _within_reach(floor, inner, 0.5 * width_m - floor.cell_m)
     return Sought(floor, inner, must, rim, width_m - overlap_m)
@@ -72,7 +75,7 @@ def rest_of(whole: Sought, trail: FloatArray, width_m: float, enough: float) -> 
     enough
         Share of the floor: the smallest pieces are left for good, down to this.
     """
-    floor, swept = whole.floor, surely_covered(whole.floor, trail, width_m)
+    floor, swept = whole.floor, surely_covered(whole.floor, trail, width_m, width_m - whole.width_m)
     must = _but_the_least(whole.must & ~swept, (1.0 - enough) * np.count_nonzero(whole.must))
     away_m = floor.cell_m * scipy.ndimage.distance_transform_edt(~must)
     return replace(whole, must=must, may=whole.may & ~swept & (away_m <= 0.5 * width_m))
@@ -99,12 +102,13 @@ def covered(floor: Floor, path: FloatArray, width_m: float) -> BoolArray:
     return found
 
 
-def surely_covered(floor: Floor, trail: FloatArray, width_m: float) -> BoolArray:
+def surely_covered(floor: Floor, trail: FloatArray, width_m: float, overlap_m: float) -> BoolArray:
     """(rows, columns) cells whose middles a pass along a trail swept, as far as the robot knows.
 
     Where it was more than twice as unsure of its place as it mostly was, as when it had just begun, the pass
     counts as narrower: by two standard deviations to either side beyond that. To ask for more of all of a
-    sweep would be to ask for it again; passes overlap by what a robot mostly is beside where it believes.
+    sweep would be to ask for it again; passes overlap by what a robot mostly is beside where it believes,
+    however sure of the millimetre it mostly is.
 
     Parameters
     ----------
@@ -115,7 +119,7 @@ def surely_covered(floor: Floor, trail: FloatArray, width_m: float) -> BoolArray
     if not len(trail):  # a sweep that ended before its first pass
         return found
     unsure_m = np.maximum(trail[:-1, 2], trail[1:, 2])
-    usual_m = float(np.median(trail[:, 2]))
+    usual_m = max(float(np.median(trail[:, 2])), OVERLAP_SHARE * overlap_m)
     radius_m = 0.5 * width_m - 2.0 * np.maximum(0.0, unsure_m - 2.0 * usual_m)
     steps = np.ceil(radius_m / STEP_M)
     for first, last in itertools.pairwise([0, *(np.flatnonzero(np.diff(steps)) + 1).tolist(), len(steps)]):

@@ -11,7 +11,7 @@ import scipy
 from pilotage.core.types import BoolArray
 from pilotage.kernels.grids.travel_cost import travel_costs
 from pilotage.maps.distance_field import DistanceField
-from pilotage.maps.floor import Floor, cell_side_m, pass_cell_m
+from pilotage.maps.floor import Floor, cell_side_m
 
 FINEST_M = 0.02
 """Side of the cells of paths, larger on large floors: passages with less than this to spare may be missed."""
@@ -32,29 +32,38 @@ class Keeping:
     start_xy_m: tuple[float, float]
 
 
-def path_floor(field: DistanceField, keeping: Keeping, width_m: float) -> Floor:
+def path_floor(field: DistanceField, keeping: Keeping, width_m: float, told: Floor) -> Floor:
     """Where the cells of a sweep's path are: they keep the clearance; where there is no room, what there is.
 
     The least is half a diagonal of a cell more than the body needs, as a line through cells' middles comes
     so much nearer to walls: cells are finer here than those that tell what is swept, of which the clearance
-    keeps half a diagonal. Nobody keeps so much that what is beside a wall is out of a pass' reach.
+    keeps half a diagonal. Nobody keeps so much that what is beside a wall is out of a pass' reach, wherever
+    cells of either kind begin: where only here and there one more is open a path has bends.
+
+    Parameters
+    ----------
+    told
+        The cells that are to be swept; some lie nearer to walls than any of a path's.
     """
-    bounds_m, inside, radius_m = field.bounds_m, keeping.start_xy_m, keeping.radius_m
-    told_m = cell_side_m(bounds_m, pass_cell_m(width_m, radius_m))
+    bounds_m, inside, radius_m, told_m = field.bounds_m, keeping.start_xy_m, keeping.radius_m, told.cell_m
     cell_m = cell_side_m(bounds_m, min(FINEST_M, told_m), MOST_CELLS)
     half_m = math.sqrt(0.5) * cell_m
     tight = Floor.of_field(
         field, bounds_m, radius_m + half_m, cell_m, inside, exact=True, most_cells=MOST_CELLS
     )
     reach_m = 0.5 * width_m - 1.5 * told_m
-    more_m = min(keeping.clearance_m - radius_m + math.sqrt(0.5) * (told_m - cell_m), reach_m)
+    beside_m = reach_m - half_m - 1.5 * cell_m
+    more_m = min(keeping.clearance_m - radius_m + math.sqrt(0.5) * (told_m - cell_m), beside_m)
     if more_m <= 0.0:
         return tight
     levels = [tight.reachable & (tight.clearance_m >= tight.radius_m + share * more_m) for share in SHARES]
     start = tight.nearest_cell(np.array(inside), "the start")
     reach = reach_m / cell_m
-    # Into a nook the body's centre can come farther than lines through cells' middles lead.
-    sought = (tight.clearance_m >= radius_m) & _within(tight.reachable, reach)
+    # Into a nook, and along a wall, the centre can come farther than lines through cells' middles lead.
+    sought = tight.clearance_m >= radius_m
+    row, column = tight.cells_of(told.middles(told.reachable))
+    sought[row, column] = True
+    sought &= _within(tight.reachable, reach)
     return replace(tight, reachable=_opened(levels, sought, start, reach))
 
 

@@ -47,8 +47,9 @@ class Context(Standing):
 
     Attributes
     ----------
-    yielding, stops
-        What came of waiting, and of walls where none should be, since nothing led back to where it was.
+    yielding, stops, holds
+        What came of waiting, of walls where none should be, and of what stands in its way, since nothing led
+        back to where it was.
     trail
         Where it has been, on a path that covers a floor.
     replans, rests
@@ -72,7 +73,7 @@ class Context(Standing):
         self._channel = journal.channel(COLUMNS, first=True)
         self.config, self._robot, self._goal = config, robot, goal
         self.dt_s = robot.dt_s
-        self._mapper, self.has_mates = parts.mapper, task.mates > 0
+        self._mapper, self._has_mates = parts.mapper, task.mates > 0
         self.own_map = OwnMap(chart, parts.mapper)
         car = car_of(robot.footprint, WALL_M, 1.0)
         walls = car, ground_of(chart.field, car)
@@ -90,13 +91,13 @@ class Context(Standing):
         self.wandering = Wandering(config.wander, robot, localizer_of(parts, "maneuver"), self.last_word)
         self.trail: Trail | None = None
         self.replans, self.rests, self.has_planned = 0, 0, False
-        self._to_walls_m = 0.0
+        self._to_walls_m, self._held_by_m = 0.0, np.zeros((0, 2))
 
     def begin_anew(self) -> None:
         """Nothing leads back to where it was."""
         robot = self._robot
         self.yielding = Yielding(self.config.yielding, self.dt_s, robot.streams.stream("yielding"))
-        self.stops = Stops()
+        self.stops, self.holds = Stops(), Stops(self.config.yielding.most_tries)
 
     def is_sure(self, belief: Belief) -> bool:
         """Whether a place that it should not be at is where it is, not what its estimate jumped to."""
@@ -112,9 +113,21 @@ class Context(Standing):
         return self._made(t_s, pose, found[:0], clearances_m)
 
     def planned_around(self, t_s: float, pose: Pose2) -> PlanResult:
-        """What was found from there around all that it sees, or not at all."""
-        cells = np.round(self.own_half.seen_m / SEEN_M).astype(np.int64)
-        seen = self.own_half.seen_m[np.unique(cells, axis=0, return_index=True)[1]]
+        """What was found from there around all that it sees, or not at all.
+
+        Around what it saw where it was held up, too, if it can: from one side of a thing it does not see the
+        other.
+        """
+        seen_m = self.own_half.seen_m
+        if len(self._held_by_m):
+            result = self._made_around(t_s, pose, np.vstack([self._held_by_m, seen_m]))
+            if result.path is not None:
+                return result
+        return self._made_around(t_s, pose, seen_m)
+
+    def _made_around(self, t_s: float, pose: Pose2, seen_m: FloatArray) -> PlanResult:
+        cells = np.round(seen_m / SEEN_M).astype(np.int64)
+        seen = seen_m[np.unique(cells, axis=0, return_index=True)[1]]
         found = np.vstack([self.own_map.found_circles_m, np.column_stack([seen, np.full(len(seen), SEEN_M)])])
         clearances_m = self._clearances_m()
         # Who can wait as well does not squeeze through where nothing is left beside its outline.
@@ -170,6 +183,14 @@ class Context(Standing):
     def may_leave(self, command: Twist, pose: Pose2) -> bool:
         """Whether moreover the lasers show room for it."""
         return self.may_drive(command, pose) and self.last_word.allows(command)
+
+    def held_up(self, to_go_m: float) -> None:
+        """Count it, and keep what it sees, where that only stands: it will not go."""
+        if self._has_mates or self._bodies.about:
+            return
+        self.holds.again(to_go_m)
+        before_m = self._held_by_m[: 0 if self.holds.count == 1 else None]
+        self._held_by_m = np.vstack([before_m, self.own_half.seen_m])
 
     def look(self, readings: Readings, belief: Belief) -> None:
         """Take in what the sensors show of what is on no map."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from pilotage.core.errors import InputError
 from pilotage.core.types import Twist
 from pilotage.maps.world_map import WorldMap
@@ -12,7 +14,14 @@ from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.navigator.maneuver.config import ManeuverConfig
 from pilotage.stack.navigator.maneuver.context import Context
 from pilotage.stack.navigator.maneuver.states import Lost, first_state
-from pilotage.stack.navigator.navigator import Parts, check_keeps_time, localizer_of, missing, only_goal
+from pilotage.stack.navigator.navigator import (
+    Parts,
+    check_finds_place,
+    check_keeps_time,
+    localizer_of,
+    missing,
+    only_goal,
+)
 from pilotage.stack.navigator.state import Ended, StateMachine
 
 
@@ -47,6 +56,10 @@ class ManeuverNavigator(StateMachine):
         localizer = localizer_of(parts, "maneuver")
         check_keeps_time(parts, "maneuver")
         self._context = context = Context(config, robot, chart, task, parts, goal, parts.planner, journal)
+        if context.plan.takes_long:
+            xmin, ymin, xmax, ymax = chart.bounds_m
+            corners_m = np.array([(x, y) for x in (xmin, xmax) for y in (ymin, ymax)])
+            check_finds_place(localizer, task.initial, corners_m, config.astray_m, "maneuver", "corner")
         super().__init__(localizer, context)
         self._state = first_state(context, self.belief)
         if context.plan.hopeless and context.plan.too_tight:

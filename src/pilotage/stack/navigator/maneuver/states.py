@@ -20,7 +20,7 @@ MOST_REPLANS, MOST_RESTS = 8, 3
 """How often it plans anew where it went astray, and for what a path that covers a floor left of it."""
 LOOK_S = 2.0
 """A robot that believes to stand in a wall looks around for so long before it plans anew: once, or until it
-knows its place."""
+knows its place. So does who plans a path that it would not plan again for what its first readings correct."""
 DOUBT_S = 10.0
 """Who is lost stands for so long, and drives about then."""
 AROUND, BACKING = 0.6, 0.2
@@ -117,9 +117,11 @@ Driving: TypeAlias = Following | BackingOut
 
 
 def first_state(context: Context, belief: Belief) -> State:
-    """Plan at once, or once it knows where it is."""
+    """Plan at once, or once it knows where it is: by its first readings where plans take long."""
     if belief.status is BeliefStatus.LOST:
         return Lost(context, LookingAround(context, 0.0), -DOUBT_S)
+    if context.plan.takes_long:
+        return LookingAround(context, LOOK_S)
     return plan(context, 0.0, belief)
 
 
@@ -135,7 +137,7 @@ def plan(context: Context, t_s: float, belief: Belief) -> State:
     if result.covers and context.trail is None:
         context.trail = Trail()
     context.lay_out(path, belief.pose.theta_rad)
-    context.journal.say(t_s, "plan" if t_s == 0.0 else "replan", result.reason)
+    context.journal.say(t_s, "replan" if again else "plan", result.reason)
     return Following(context)
 
 
@@ -180,7 +182,7 @@ def drive(context: Context, state: Driving, readings: Readings, belief: Belief) 
     act = context.yielding.step(rate, rate * abs(speed_m_s) * context.dt_s, backs=backs)
     context.yielding.drove(reached, backs=backs)
     if act is not Act.NOTHING:
-        return Move(give_way(context, state, t_s, belief, act), STOP)
+        return Move(give_way(context, state, t_s, belief, act, float(row[5])), STOP)
     return Move(state, command)
 
 
@@ -210,10 +212,13 @@ def step_clear(context: Context, t_s: float, belief: Belief) -> SteppingClear | 
     return SteppingClear(context, step, t_s + STEP_S)
 
 
-def give_way(context: Context, state: Driving, t_s: float, belief: Belief, act: Act) -> State:
+def give_way(context: Context, state: Driving, t_s: float, belief: Belief, act: Act, to_go_m: float) -> State:
     """Having been held up for long: around what it sees, or back the way that it came."""
-    if context.yielding.gives_up and not context.has_mates:
-        return fail(context, t_s, "stuck: something stands in its way, and nothing leads around")
+    context.held_up(math.inf if isinstance(state, BackingOut) else to_go_m)
+    if context.holds.too_many:
+        around = context.planned_around(t_s, belief.pose)
+        found = "a path around leads no farther" if around.path is not None else around.reason
+        return fail(context, t_s, f"stuck: something stands in its way: {found}")
     out: State | None = None
     if act is Act.BACK:
         out = back_out(context, t_s, belief, "backs out the way that it came")

@@ -1,4 +1,4 @@
-"""How often a robot was stopped before what no plan of its knows, since it last got on."""
+"""How often a robot was stopped or held up since it last got on."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ class Stops:
         Since it last got on.
     """
 
-    def __init__(self) -> None:
-        self.count, self._to_go_m = 0, math.inf
+    def __init__(self, most: int = MOST_STOPS) -> None:
+        self.count, self._to_go_m, self._most = 0, math.inf, most
 
     def again(self, to_go_m: float) -> None:
         """Stopped once more, with so much to go; infinite where it was not on its way."""
@@ -31,4 +31,4 @@ class Stops:
     @property
     def too_many(self) -> bool:
         """Whether it gets no farther along its plans."""
-        return self.count > MOST_STOPS
+        return self.count > self._most

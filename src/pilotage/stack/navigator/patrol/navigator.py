@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from pilotage.core.errors import InputError
 from pilotage.core.types import STOP, Twist
 from pilotage.maps.world_map import WorldMap
@@ -16,19 +14,18 @@ from pilotage.stack.interface import NAVIGATORS, Belief, BeliefStatus, StackStat
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.localization.localizer import Abilities
-from pilotage.stack.navigator.navigator import Parts, localizer_of
+from pilotage.stack.navigator.navigator import Parts, check_finds_place, localizer_of
 from pilotage.stack.navigator.patrol.config import PatrolNavigatorConfig
 from pilotage.stack.navigator.patrol.context import Context
 from pilotage.stack.navigator.patrol.paths import roadmap_for
 from pilotage.stack.navigator.patrol.precedence import Leading, precedence
-from pilotage.stack.navigator.patrol.senses import SIGMAS, stop_m
+from pilotage.stack.navigator.patrol.senses import stop_m
 from pilotage.stack.navigator.patrol.states import transitions
 from pilotage.stack.navigator.patrol.states.charging import Charging
 from pilotage.stack.navigator.patrol.states.driving import Waiting
 from pilotage.stack.navigator.patrol.states.lost import Lost
 from pilotage.stack.navigator.patrol.states.state import State
 from pilotage.stack.navigator.wandering import Wandering
-from pilotage.stack.patrol.task import PatrolTask
 
 COLUMNS = {
     "mode": "1",
@@ -77,8 +74,8 @@ class PatrolNavigator:
             )
         self._localizer = localizer_of(parts, "patrol")
         able = Abilities.of(self._localizer)
-        if not able.on_map:
-            _check_start(task.initial, parts.patrol)
+        places_m, visit_m = parts.patrol.graph.vertices_xy_m, parts.patrol.visit_m
+        check_finds_place(self._localizer, task.initial, places_m, visit_m, "patrol", "place to visit")
         if len(parts.patrol.starts) > 1:
             _check_beams(config, robot, min(parts.patrol.radii_m))
         self._tell_mates = able.tell_mates
@@ -149,20 +146,6 @@ class PatrolNavigator:
         """Whether no corner swings into anybody: who comes on is soon inside the disc that it drives as."""
         swings = command.v_m_s == 0.0 and command.w_rad_s != 0.0
         return not (swings and self._context.motion.is_met) and self._last_word.allows(command)
-
-
-def _check_start(start: Belief, task: PatrolTask) -> None:
-    """Refuse a start so vague that it passes by places; nothing that it senses mends that."""
-    x, y, cov = start.pose.x_m, start.pose.y_m, start.cov
-    away_m = float(np.hypot(*(task.graph.vertices_xy_m - (x, y)).T).max())
-    position_m, heading_rad = (SIGMAS * math.sqrt(cov.diagonal()[of].max()) for of in ([0, 1], [2]))
-    wrong_m = math.hypot(position_m, away_m * heading_rad)
-    if wrong_m > task.visit_m:
-        raise InputError(
-            "navigator 'patrol': expected a localizer that finds its place on the map, found one that keeps "
-            f"what it is wrong by at the start, up to {wrong_m:.1f} m at the farthest place to visit; take "
-            "stack.localizer: laser, or a stack.initial of smaller variances"
-        )
 
 
 def _check_beams(config: PatrolNavigatorConfig, robot: RobotKnowledge, mate_m: float) -> None:
