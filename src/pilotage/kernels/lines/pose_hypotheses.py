@@ -106,7 +106,7 @@ def pair_poses(
 
 @kernel
 def _long_enough(segments: FloatArray, end: FloatArray, slack: float, least_overlap: float) -> IntArray:
-    """Walls that a line of that extent can overlap by so much of it; where its ends scatter, by a little less.
+    """Walls that a line of that extent can overlap by so much of it; a little less where its ends scatter.
 
     An outline of cells has tens of thousands of walls that are shorter than any line.
     """
