@@ -81,7 +81,8 @@ class OpenFloor:
         if self._home == 0:
             raise InputError(
                 f"world.start: expected random places {clearance_m:g} m from walls to be reached from "
-                f"({reachable_from.x_m:g}, {reachable_from.y_m:g}), found none; ask for less clearance_m"
+                f"({reachable_from.x_m:g}, {reachable_from.y_m:g}), found none; "
+                "ask for less clearance_m, or for no random places"
             )
 
     @cached_property
