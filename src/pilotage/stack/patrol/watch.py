@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from pydantic import Field
 
 from pilotage.core.config import Config
-from pilotage.core.types import FloatArray
+from pilotage.core.types import BoolArray, FloatArray
 from pilotage.kernels.scans.loose_clusters import loose_clusters
 from pilotage.sensors.sensor import NonNegative, Positive
 
@@ -66,3 +67,21 @@ class IntruderWatch:
             tracks.append((x, y, count, told))
         self._tracks = tracks
         return found
+
+    def follows(self, strange_xy_m: FloatArray) -> BoolArray:
+        """(M,) which of a scan's returns, map frame, are of who was told and never out of sight since.
+
+        He is no mate, however old the words of mates have become meanwhile.
+        """
+        config, follows = self._config, np.zeros(len(strange_xy_m), dtype=np.bool_)
+        told = [(x, y) for x, y, _, was_told in self._tracks if was_told]
+        if not told:  # as nearly always
+            return follows
+        clusters = loose_clusters(strange_xy_m, config.gap_m, config.widest_m, config.points)
+        for track in told if len(clusters) else ():
+            away_m = np.hypot(*(clusters - track).T)
+            nearest = int(np.argmin(away_m))
+            if away_m[nearest] <= config.follows_m:
+                offset = strange_xy_m - clusters[nearest]
+                follows |= np.hypot(*offset.T) <= 0.5 * config.widest_m
+        return follows
