@@ -97,19 +97,20 @@ class TestWatching:
 
     def test_who_was_told_is_followed_and_nobody_beside_him(self) -> None:
         watch, somebody = IntruderWatch(WatchConfig(scans=3)), np.array([[0.0, 1.0], [0.2, 1.0]])
-        mate = somebody + np.array([0.8, 0.0])
-        assert not watch.follows(somebody).any(), "was not seen"
+        mate = somebody + np.array([0.7, 0.0])
+        assert not watch.follows(somebody, 0.3).any(), "was not seen"
         for _ in range(2):
             watch.step(somebody)
-        assert not watch.follows(somebody).any(), "was not told yet"
+        assert not watch.follows(somebody, 0.3).any(), "was not told yet"
         watch.step(somebody)
         for _ in range(10):  # no word of a mate tells any more that he is none
             somebody = somebody - np.array([0.2, 0.0])
             seen = np.vstack([somebody, mate])
-            assert watch.follows(seen).tolist() == [True, True, False, False]
-            watch.step(seen[watch.follows(seen)])
+            assert watch.follows(seen, 0.3).tolist() == [True, True, False, False]
+            watch.step(seen[watch.follows(seen, 0.3)])
+        assert not watch.follows(mate, 0.3).any(), "is somebody else"
         watch.step(somebody[:0])
-        assert not watch.follows(somebody).any(), "was out of sight meanwhile"
+        assert not watch.follows(somebody, 0.3).any(), "was out of sight meanwhile"
 
 
 class TestSensed:

@@ -68,20 +68,27 @@ class IntruderWatch:
         self._tracks = tracks
         return found
 
-    def follows(self, strange_xy_m: FloatArray) -> BoolArray:
+    def follows(self, strange_xy_m: FloatArray, reach_m: float) -> BoolArray:
         """(M,) which of a scan's returns, map frame, are of who was told and never out of sight since.
 
         He is no mate, however old the words of mates have become meanwhile.
+
+        Parameters
+        ----------
+        reach_m
+            How far somebody may have gone since the last scan.
         """
         config, follows = self._config, np.zeros(len(strange_xy_m), dtype=np.bool_)
         told = [(x, y) for x, y, _, was_told in self._tracks if was_told]
         if not told:  # as nearly always
             return follows
         clusters = loose_clusters(strange_xy_m, config.gap_m, config.widest_m, config.points)
-        for track in told if len(clusters) else ():
-            away_m = np.hypot(*(clusters - track).T)
-            nearest = int(np.argmin(away_m))
-            if away_m[nearest] <= config.follows_m:
-                offset = strange_xy_m - clusters[nearest]
-                follows |= np.hypot(*offset.T) <= 0.5 * config.widest_m
+        if not len(clusters):
+            return follows
+        away_m = np.linalg.norm(strange_xy_m[:, None] - clusters, axis=2)
+        of_cluster = np.where(away_m.min(axis=1) <= 0.5 * config.widest_m, away_m.argmin(axis=1), -1)
+        for track in told:
+            moved_m = np.hypot(*(clusters - track).T)
+            if moved_m.min() <= reach_m:
+                follows |= of_cluster == moved_m.argmin()
         return follows

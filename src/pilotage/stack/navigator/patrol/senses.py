@@ -35,6 +35,10 @@ NEAR_M = 1.6
 """Returns beyond this distance from the axle are out of the way of one decision, of a robot that stops in
 less."""
 LATENCY_S = 0.05
+PEOPLE_M_S = 1.4
+"""Who is no mate may come on at a walk, and gives way to nobody."""
+SHIFT_M = 0.1
+"""Of a body that stands another part may be seen from one scan to the next."""
 SIGMAS = 3.0
 TOLD_M, FAILED_M = 0.2, 0.35
 """What a mate may be wrong about its place by, and how far off a body is seen besides."""
@@ -180,7 +184,7 @@ class Senses:
             return NO_POINTS
         told_m, own = self.config.watch.mate_m, self.task.robot
         people = self._last_words.of_nobody(self.strange, self.pose, own, self.t_s, told_m, self.speed_m_s)
-        follows = self._watch.follows(self.strange_on_map())
+        follows = self._watch.follows(self.strange_on_map(), PEOPLE_M_S * self.period_s + SHIFT_M)
         if not follows.any():
             return people
         return self.strange[follows | np.isin(self.strange @ AS_ONE, people @ AS_ONE)]
