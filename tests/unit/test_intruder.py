@@ -9,18 +9,25 @@ import numpy as np
 import pytest
 
 from pilotage.core.errors import InputError
+from pilotage.core.types import Pose2
 from pilotage.experiments.build.build import build
 from pilotage.experiments.loop import run_loop
 from pilotage.experiments.mission import load_mission
 from pilotage.kernels.scans.loose_clusters import loose_clusters
+from pilotage.sensors.lidar import LidarConfig
+from pilotage.sensors.readings import LidarScan, Readings
 from pilotage.sim.people.intruder import Intruder, IntruderConfig
 from pilotage.sim.people.people import Around, PeopleSetting
 from pilotage.sim.worlds.world import World
+from pilotage.stack.interface import Belief
+from pilotage.stack.patrol.messages import PatrolMemory
 from pilotage.stack.patrol.watch import IntruderWatch, WatchConfig
+from pilotage.stack.patrol.word import TeamWord
 from support.worlds import ROOM_MAP
 
 ROBOTS = np.array([[2.0, 2.0, 0.0, 0.3]])
 STOPPING = np.array([[0.0, 1.0]])
+NEWS = PatrolMemory(2, 1, 2, 0, 1.0).message(0.0)
 
 
 def judged(seed: int, duration_s: float, *overrides: str) -> dict[str, Any]:
@@ -87,6 +94,52 @@ class TestWatching:
         crowd = np.array([[x + dx, 1.0] for x in (0.0, 3.0, 6.0) for dx in (0.0, 0.1)])
         assert [len(watch.step(crowd)) for _ in range(10)] == [0] * 8 + [3, 0]
         assert [len(watch.step(crowd[:2])) for _ in range(4)] == [0] * 4  # who is left was told already
+
+    def test_who_was_told_is_followed_and_nobody_beside_him(self) -> None:
+        watch, somebody = IntruderWatch(WatchConfig(scans=3)), np.array([[0.0, 1.0], [0.2, 1.0]])
+        mate = somebody + np.array([0.7, 0.0])
+        assert not watch.follows(somebody, 0.3).any(), "was not seen"
+        for _ in range(2):
+            watch.step(somebody)
+        assert not watch.follows(somebody, 0.3).any(), "was not told yet"
+        watch.step(somebody)
+        for _ in range(10):  # no word of a mate tells any more that he is none
+            somebody = somebody - np.array([0.2, 0.0])
+            seen = np.vstack([somebody, mate])
+            assert watch.follows(seen, 0.3).tolist() == [True, True, False, False]
+            watch.step(seen[watch.follows(seen, 0.3)])
+        assert not watch.follows(mate, 0.3).any(), "is somebody else"
+        watch.step(somebody[:0])
+        assert not watch.follows(somebody, 0.3).any(), "was out of sight meanwhile"
+
+
+class TestSensed:
+    def test_he_stays_who_he_is_while_mates_fall_silent(self) -> None:
+        """A robot that rolls on for seconds took him for a mate that stops, as its words had become old."""
+        hall = "world.map={map: hall, walls_m: [[0, 0, 20, 0], [20, 0, 20, 9], [20, 9, 0, 9], [0, 9, 0, 0]]}"
+        team = build(load_mission("museum-intruder", ["team.size=2", hall])).team
+        senses = team[0].stack._context  # type: ignore[attr-defined]
+        mate = team[1].stack._context.talk_habit  # type: ignore[attr-defined]
+        belief = Belief(Pose2(4.0, 4.5, 0.0), 1e-6 * np.eye(3))
+        lidar, config = team[0].known.one_sensor(LidarConfig, "test")
+        angles = np.asarray(config.beam_angles_rad())
+        ahead = np.abs(angles) < 0.12
+
+        def people(t_s: float, away_m: float | None) -> int:
+            cosines, sines = np.cos(angles), np.sin(angles)
+            with np.errstate(divide="ignore"):
+                walls = np.minimum(np.where(cosines > 0.0, 16.0, 4.0) / np.abs(cosines), 4.5 / np.abs(sines))
+            ranges = np.minimum(walls, config.max_range_m)
+            if away_m is not None:
+                ranges[ahead] = away_m
+            senses.take_in(Readings(t_s, {lidar: LidarScan(ranges)}), belief, lost=False)
+            return len(senses.people)
+
+        senses.hear(0.0, TeamWord(18.0, 1.0, False, None, None, NEWS, 0.3, talk=mate))
+        assert all(people(0.2 * k, 3.0) == ahead.sum() for k in range(6))
+        assert all(people(1.2 + 0.2 * k, 3.0) == ahead.sum() for k in range(200)), "in sight all the time"
+        assert people(42.0, None) == 0
+        assert people(42.2, 3.0) == 0, "it may be the mate that comes back"
 
 
 class TestMuseum:

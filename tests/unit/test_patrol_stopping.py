@@ -180,17 +180,29 @@ class TestStopping:
         assert abs(pose[2]) > 1.0  # at rest it turned
 
     @pytest.mark.parametrize("side", [1.0, -1.0])
-    def test_who_stops_in_a_bend_does_not_roll_off_it_into_the_wall(self, side: float) -> None:
-        """On weak brakes it rolls on for 0.6 m: straight on that ends in the wall outside of the bend."""
+    @pytest.mark.parametrize("others", ["nobody", "a mate", "a walker"])
+    def test_who_stops_in_a_bend_does_not_roll_off_it_into_the_wall(self, side: float, others: str) -> None:
+        """On weak brakes it rolls on for 0.6 m: straight on that ends in the wall outside of the bend.
+
+        So it does before somebody from whom no arc keeps what it should.
+        """
         limits, safety = np.array([1.2, 1.0, 1.0, 2.0, 8.0, 0.2]), np.array([REACTION, 0.25, 0.06, 0.1, 1.4])
         along = np.linspace(-0.5, 1.5, 200)
         wall = np.column_stack([along, -side * (0.36 - 0.23 * along)])
+        walker, mate = np.array([[1.6, 0.5 * side]]), np.array([[0.9, 0.3 * side]])
+        strange, people = {
+            "nobody": (NOBODY, NOBODY),
+            "a mate": (mate, NOBODY),
+            "a walker": (walker, walker),
+        }[others]
         least = []
         for is_told in (True, False):
             pose, v, w = np.zeros(3), 1.1, 0.85 * side
             for _ in range(8):
-                near = disc_returns.rotated(wall - pose[:2], -pose[2])
-                seen, known = (near, NOBODY, NOBODY), (NO_MAP, 0.0, 0.0, 0.1)
+                near, moving, coming = (
+                    disc_returns.rotated(points - pose[:2], -pose[2]) for points in (wall, strange, people)
+                )
+                seen, known = (near, moving, coming), (NO_MAP, 0.0, 0.0, 0.1)
                 turn = safe_stop.braking_turn(v, w, limits, safety, seen, pose, known)
                 for _ in range(20):
                     v = safe_stop.toward(v, 0.0, 0.01)

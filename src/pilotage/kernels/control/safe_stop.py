@@ -81,23 +81,44 @@ def braking_turn(
     it does not.
 
     Who stops sooner than was reckoned when it was told to turn leaves the arc that was clear; on weak brakes
-    it rolls on for a metre. The margin to walls, a half of it or none: the most that leaves a way.
+    it rolls on for a metre. The margin to walls, a half of it or none: the most that leaves a way. Where none
+    is clear of who may come on all the while, one that is of the rest; else one that is of what stands.
     """
+    near, strange, people = seen
+    w = least_turn(v0, w0, limits, safety, seen, pose, known)
+    if w == np.inf and people.shape[0] > 0:
+        w = least_turn(v0, w0, limits, safety, (near, strange, people[:0]), pose, known)
+    if w == np.inf and strange.shape[0] > 0:
+        w = least_turn(v0, w0, limits, safety, (near, strange[:0], people[:0]), pose, known)
+    return w if w < np.inf else 0.0
+
+
+@kernel
+def least_turn(
+    v0: float,
+    w0: float,
+    limits: FloatArray,
+    safety: FloatArray,
+    seen: Seen,
+    pose: FloatArray,
+    known: Field,
+) -> float:
+    """As ``braking_turn``, clear of all that is seen; infinite where none is."""
     if stop_is_clear(v0, w0, 0.0, 0.0, limits, safety, seen, pose, known):
         return 0.0
     most = limits[4] * limits[5]
     low, high = max(-limits[3], w0 - most), min(limits[3], w0 + most)
     kept = safety.copy()
+    best = np.inf
     for share in KEPT:
         kept[2] = share * safety[2]
-        best = np.inf
         for k in range(TURNS + 1):
             w = low + (high - low) * k / TURNS
             if abs(w) < abs(best) and stop_is_clear(v0, w0, 0.0, w, limits, kept, seen, pose, known):
                 best = w
         if best < np.inf:
-            return best
-    return 0.0
+            break
+    return best
 
 
 @kernel

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from pydantic import Field
 
 from pilotage.core.config import Config
-from pilotage.core.types import FloatArray
+from pilotage.core.types import BoolArray, FloatArray
 from pilotage.kernels.scans.loose_clusters import loose_clusters
 from pilotage.sensors.sensor import NonNegative, Positive
 
@@ -66,3 +67,28 @@ class IntruderWatch:
             tracks.append((x, y, count, told))
         self._tracks = tracks
         return found
+
+    def follows(self, strange_xy_m: FloatArray, reach_m: float) -> BoolArray:
+        """(M,) which of a scan's returns, map frame, are of who was told and never out of sight since.
+
+        He is no mate, however old the words of mates have become meanwhile.
+
+        Parameters
+        ----------
+        reach_m
+            How far somebody may have gone since the last scan.
+        """
+        config, follows = self._config, np.zeros(len(strange_xy_m), dtype=np.bool_)
+        told = [(x, y) for x, y, _, was_told in self._tracks if was_told]
+        if not told:  # as nearly always
+            return follows
+        clusters = loose_clusters(strange_xy_m, config.gap_m, config.widest_m, config.points)
+        if not len(clusters):
+            return follows
+        away_m = np.linalg.norm(strange_xy_m[:, None] - clusters, axis=2)
+        of_cluster = np.where(away_m.min(axis=1) <= 0.5 * config.widest_m, away_m.argmin(axis=1), -1)
+        for track in told:
+            moved_m = np.hypot(*(clusters - track).T)
+            if moved_m.min() <= reach_m:
+                follows |= of_cluster == moved_m.argmin()
+        return follows

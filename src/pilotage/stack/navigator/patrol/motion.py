@@ -12,7 +12,14 @@ from pilotage.models.motion.motion import MotionConfig
 from pilotage.stack.navigator.patrol.gate import NO_GATE, gate_at
 from pilotage.stack.navigator.patrol.onward import Onward
 from pilotage.stack.navigator.patrol.passage import CLAIM_M
-from pilotage.stack.navigator.patrol.senses import LATENCY_S, NO_DISCS, NO_POINTS, Senses
+from pilotage.stack.navigator.patrol.senses import (
+    AS_ONE,
+    LATENCY_S,
+    NO_DISCS,
+    NO_POINTS,
+    PEOPLE_M_S,
+    Senses,
+)
 from pilotage.stack.navigator.patrol.still import StillWatch
 from pilotage.stack.patrol.roadmap import Roadmap
 
@@ -31,12 +38,8 @@ ROUND_M = 0.06
 """Returns that lie so near to a rim as large as its own, on average, are of a mate's."""
 TALKS_PERIODS = 3.0
 """A body is that of a mate who said so lately that it is there."""
-AS_ONE = np.array([1.0, 1j])
-"""A place as one number, for finding returns among others."""
 SLOWED = 1.0, 0.5, 0.25, 0.125, 0.0
 """Shares of a speed that are tried; who rolls yet may have no room to turn meanwhile."""
-PEOPLE_M_S = 1.4
-"""Who is no mate may come on at a walk, and gives way to nobody."""
 
 
 class Motion:

@@ -28,11 +28,17 @@ from pilotage.stack.patrol.word import Talk, TeamWord
 NO_FIELD: FloatArray = np.zeros((1, 1))
 NO_POINTS: FloatArray = np.zeros((0, 2))
 NO_DISCS: FloatArray = np.zeros((0, 3))
+AS_ONE = np.array([1.0, 1j])
+"""A place as one number, for finding returns among others."""
 SECTORS = 72
 NEAR_M = 1.6
 """Returns beyond this distance from the axle are out of the way of one decision, of a robot that stops in
 less."""
 LATENCY_S = 0.05
+PEOPLE_M_S = 1.4
+"""Who is no mate may come on at a walk, and gives way to nobody."""
+SHIFT_M = 0.1
+"""Of a body that stands another part may be seen from one scan to the next."""
 SIGMAS = 3.0
 TOLD_M, FAILED_M = 0.2, 0.35
 """What a mate may be wrong about its place by, and how far off a body is seen besides."""
@@ -170,11 +176,18 @@ class Senses:
             self.say("intruder", text)
 
     def _strangers(self) -> FloatArray:
-        """(P, 2) returns, base frame, that are of no mate; none while one is not heard: it may be it."""
+        """(P, 2) returns, base frame, that are of no mate: by its words, or followed since they told so.
+
+        None while one is not heard: whoever comes into sight may be it.
+        """
         if not len(self.strange):
             return NO_POINTS
         told_m, own = self.config.watch.mate_m, self.task.robot
-        return self._last_words.of_nobody(self.strange, self.pose, own, self.t_s, told_m, self.speed_m_s)
+        people = self._last_words.of_nobody(self.strange, self.pose, own, self.t_s, told_m, self.speed_m_s)
+        follows = self._watch.follows(self.strange_on_map(), PEOPLE_M_S * self.period_s + SHIFT_M)
+        if not follows.any():
+            return people
+        return self.strange[follows | np.isin(self.strange @ AS_ONE, people @ AS_ONE)]
 
     def field(self, *, lost: bool) -> safe_stop.Field:
         """Distances on its map, their origin and resolution; none where it does not know where it is."""
