@@ -13,6 +13,7 @@ gymnasium = pytest.importorskip("gymnasium", reason="needs the extra 'gym'")
 
 from pilotage.bridges import gym  # noqa: E402
 from pilotage.core.errors import InputError  # noqa: E402
+from pilotage.experiments.build.build import build_source  # noqa: E402
 from support.missions import reach  # noqa: E402
 
 EXACT = {"robot.sensors.lidar.range_var_m2": 0.0, "run.time_limit_s": 12.0}
@@ -88,6 +89,16 @@ def test_every_episode_has_a_start_and_a_goal_of_its_own_where_the_mission_draws
     again, _ = begun(3, 4)
     assert np.array_equal(goals, again)
     assert not np.array_equal(goals[:40], begun(4, 1)[0][:40])
+
+
+def test_no_episode_begins_or_ends_in_what_the_seed_put_there() -> None:
+    across = {"world.obstacles": [{"kind": "across-path", "length_m": [5.0, 6.0], "thickness_m": 2.0}]}
+    env = many(count=1, set=EXACT | DRAWN | across)
+    placed = build_source(env.mission).obstacles
+    places = np.concatenate([env._beginnings[1:, :2], env._goals[1:, :2]])
+    assert len(placed.polygons_m) == 1
+    assert min(placed.room_m(x, y) for x, y in places.tolist()) >= 0.6
+    env.close()
 
 
 def test_noise_goes_by_the_seed_and_not_by_the_threads() -> None:

@@ -218,7 +218,7 @@ def _episodes(mission: Mission, built: Source) -> tuple[FloatArray, FloatArray]:
     body, world = built.simulator.bodies[0], mission.world
     states, goals = [body.state.copy()], [goal_of(built.mission)]
     if world.random_start is not None or world.random_goal is not None:
-        (draw,) = random_places(mission, built.chart)
+        (draw,) = random_places(mission, built.chart, built.obstacles)
         rng = RandomStreams(mission.run.seed).stream("episodes")
         room_m = goals[0].tolerance_m + body.footprint.radius_m
         for _ in range(PLACES - 1):

@@ -11,6 +11,7 @@ from pilotage.core.angles import wrap_to_pi
 from pilotage.core.errors import InputError
 from pilotage.core.random import RandomStreams
 from pilotage.core.types import Pose2
+from pilotage.experiments.build.obstacles import Obstacles
 from pilotage.experiments.build.open_floor import OpenFloor, random_pose, room_m
 from pilotage.experiments.build.random_places import RandomPlaces
 from pilotage.experiments.build.robots import footprint_of
@@ -60,7 +61,7 @@ def settle_places(mission: Mission, chart: WorldMap, about: tuple[float, float] 
         mission = _with_drawn_starts(mission, chart, about)
     world = mission.world
     streams = RandomStreams(mission.run.seed)
-    draws = random_places(mission, chart)
+    draws = random_places(mission, chart, Obstacles.fixed(world.obstacles))
     starts = _starts(mission, draws, streams.stream("start"))
     rng = streams.stream("kidnap")
     kidnaps = tuple(
@@ -75,8 +76,8 @@ def settle_places(mission: Mission, chart: WorldMap, about: tuple[float, float] 
     return mission.model_copy(update={"world": mission.world.model_copy(update=settled)})
 
 
-def random_places(mission: Mission, chart: WorldMap) -> list[RandomPlaces]:
-    """What draws each robot's start and goal.
+def random_places(mission: Mission, chart: WorldMap, obstacles: Obstacles) -> list[RandomPlaces]:
+    """What draws each robot's start and goal, clear of obstacles that are on no map.
 
     Raises
     ------
@@ -89,6 +90,7 @@ def random_places(mission: Mission, chart: WorldMap) -> list[RandomPlaces]:
         RandomPlaces(
             world,
             chart,
+            obstacles,
             mission.start_of(robot) if draws_start else start_pose(mission, index, chart),
             mission.goal_of(robot),
         )

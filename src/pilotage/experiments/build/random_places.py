@@ -29,11 +29,15 @@ class RandomPlaces:
     """
 
     def __init__(
-        self, world: WorldConfig, chart: WorldMap, given: PoseConfig | None, goal: GoalConfig | None
+        self,
+        world: WorldConfig,
+        chart: WorldMap,
+        obstacles: Obstacles,
+        given: PoseConfig | None,
+        goal: GoalConfig | None,
     ) -> None:
-        self._world, self._chart = world, chart
+        self._world, self._chart, self._obstacles = world, chart, obstacles
         self.given, self.goal_like = given, goal or GoalConfig(x_m=0.0, y_m=0.0)
-        self._obstacles = Obstacles.fixed(world.obstacles)
 
     def start(self, rng: np.random.Generator, apart_from: Apart = ()) -> PoseConfig:
         """A starting pose; the given one where the world draws none.
