@@ -17,7 +17,7 @@ from pilotage.bridges.ros.run_messages import RunMessages, Stamped
 from pilotage.cli.app import dispatch
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, Pose2
-from pilotage.experiments.recordings.bag_drive import _part_var, _scans, _sheet
+from pilotage.experiments.recordings.bag_drive import _moves, _part_var, _periods_s, _scans, _sheet
 from pilotage.experiments.recordings.run_scans import read_run_scans
 from pilotage.logs.bag_kinds import LANDMARKS, POSES
 from pilotage.logs.bag_series import landmarks_in_base, read_series
@@ -153,13 +153,29 @@ def test_which_part_of_a_slow_increment_is_whose_is_unsure_where_the_robot_turns
     def driven(t_s: FloatArray) -> FloatArray:
         return np.column_stack([0.0 * t_s, 0.0 * t_s, turned_rad(t_s)])
 
-    var = _part_var(slow_s, driven(slow_s), clock)
+    every = np.ones(len(clock), dtype=np.bool_)
+    var = _part_var(slow_s, driven(slow_s), clock, every)
     assert (var[clock < 3.0] == 0.0).all(), "standing, and even motion, is known in all its parts"
     off_rad = turned_rad(clock) - np.interp(clock, slow_s, turned_rad(slow_s))
     turning = clock > 4.5
     told_rad = float(np.sqrt(var[turning, 2].mean()))
     assert np.diff(off_rad)[turning[1:]].std() < told_rad < 3.0 * np.abs(off_rad).max()
-    assert (_part_var(clock, driven(clock), slow_s) == 0.0).all(), "faster than the steps"
+    assert (_part_var(clock, driven(clock), slow_s, every[: len(slow_s)]) == 0.0).all(), "faster"
+    # Steps between readings are parts of a whole that is known where odometry came with both.
+    assert (_part_var(slow_s, driven(slow_s), clock, np.isin(clock, slow_s)) == 0.0).all()
+
+
+def test_readings_that_arrive_in_bursts_were_driven_at_usual_speeds() -> None:
+    """Stamped on arrival, a millisecond apart after each pause: 30 m/s were believed, and any heading."""
+    told_s = np.arange(0.0, 60.0, 0.1)
+    stamped_s = np.ceil(told_s / 0.5 - 1e-9) * 0.5 + 1e-3 * ((np.arange(len(told_s)) - 1) % 5)
+    poses = np.column_stack([0.5 * told_s, 0.0 * told_s, 0.0 * told_s])
+    moved = _moves(poses)[1:, 0]
+    sure, bursts = (moved / _periods_s(t_s) for t_s in (told_s, stamped_s))
+    assert bursts.max() < 1.5 * sure.max()
+    read = np.arange(len(told_s)) % 3 == 0
+    var = _part_var(stamped_s, poses, stamped_s, read)
+    assert var.max() < 1e-12, "each reading came with odometry"
 
 
 @pytest.mark.parametrize(("first_rad", "beams"), [(-1.2, 300), (-1.8, 300), (-1.5, 301), (0.0, 620)])

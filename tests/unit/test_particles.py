@@ -22,9 +22,11 @@ from pilotage.maps.nearest_obstacles import NearestObstacles
 from pilotage.maps.rasterize import rasterized
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.maps.world_map import WorldMap
-from pilotage.sensors.readings import LidarScan, Readings
+from pilotage.sensors.readings import LidarScan, OdometryIncrement, Readings
+from pilotage.stack.interface import BeliefStatus
 from pilotage.stack.localization.likelihood_field import thin_share
 from pilotage.stack.localization.localizer import LOCALIZERS
+from pilotage.stack.localization.odometry_doubt import OdometryDoubt
 from pilotage.stack.localization.particle_filter import MclConfig, ParticleFilterLocalizer
 from pilotage.stack.localization.same_witness import widening
 from support.robots import ROOM, sensors, told_of
@@ -182,6 +184,50 @@ def test_it_tracks_on_an_occupancy_grid() -> None:
         belief = localizer.step(sim.step(Twist(0.3, 0.4 if step % 60 < 30 else -0.4)))
         if step > 20:
             assert math.hypot(belief.pose.x_m - sim.truth.x_m, belief.pose.y_m - sim.truth.y_m) < 0.1
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_wheels_that_tell_no_sign_lead_nobody_astray(seed: int) -> None:
+    """Freiburg 079's odometry tells a robot that reverses to drive forwards: a metre off in two seconds."""
+    told = told_of(start=Pose2(6.0, 4.0, 0.0), variances=(1e-4, 1e-4, 1e-4), seed=seed)
+    localizer = told.localizer(ParticleFilterLocalizer, MclConfig())
+    sim = alone(robot(sensors(), start=Pose2(6.0, 4.0, 0.0), seed=seed))
+    wrong = localized = 0
+    for step in range(120):
+        readings = sim.step(Twist(-0.5 if 20 <= step < 60 else 0.5, 0.3))
+        odometry = readings.by_sensor["odometry"]
+        assert isinstance(odometry, OdometryIncrement)
+        unsigned = replace(odometry, distance_m=abs(odometry.distance_m))
+        belief = localizer.step(replace(readings, by_sensor={**readings.by_sensor, "odometry": unsigned}))
+        off = belief.pose.as_array() - sim.truth.as_array()
+        off[2] = (off[2] + math.pi) % (2.0 * math.pi) - math.pi
+        assert math.hypot(off[0], off[1]) < 0.2
+        localized += belief.status is BeliefStatus.LOCALIZED
+        far = float(off @ np.linalg.solve(belief.cov, off)) > 16.3
+        wrong += belief.status is BeliefStatus.LOCALIZED and far
+    assert wrong <= 5
+    assert localized >= 50
+    assert math.hypot(off[0], off[1]) < 0.05
+
+
+def test_who_is_never_contradicted_keeps_the_belief_in_its_wheels() -> None:
+    """Corrections as large as the belief says leave it alone; one beyond chance tells how far, and fades."""
+    rng, doubt = np.random.default_rng(0), OdometryDoubt()
+    prior = np.array([1.0, 2.0, math.pi / 2.0]), np.diag([1e-4, 4e-4, 1e-4])
+    for _ in range(1000):
+        doubt.tell(prior, rng.multivariate_normal(prior[0], 0.7 * prior[1]), 0.1, 0.0)
+    assert doubt.stds is None
+    doubt.tell(prior, prior[0] + np.array([0.0, 0.3, 0.0]), 0.1, 0.0)
+    assert doubt.stds is not None
+    assert doubt.stds == pytest.approx([0.3, 0.03, 0.06], rel=0.02), "ahead is along the map's y"
+    for _ in range(20):
+        doubt.tell(prior, prior[0], 0.1, 0.0)
+    assert doubt.stds is None
+    for _ in range(2):
+        doubt.tell(prior, prior[0] + np.array([0.0, 0.07, 0.0]), 0.1, 0.0)
+    assert doubt.stds is not None, "two that alone would be chance"
+    doubt.forget()
+    assert doubt.stds is None
 
 
 def test_a_scan_without_returns_leaves_the_belief_and_strange_ranges_do_no_harm() -> None:

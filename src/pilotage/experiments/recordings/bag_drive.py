@@ -10,7 +10,7 @@ import numpy as np
 
 from pilotage.core.angles import wrap_array_to_pi
 from pilotage.core.errors import InputError
-from pilotage.core.types import FloatArray, IntArray, Pose2
+from pilotage.core.types import BoolArray, FloatArray, IntArray, Pose2
 from pilotage.experiments.recordings.bag_gyroscope import SHEET as GYROSCOPE_SHEET
 from pilotage.experiments.recordings.bag_gyroscope import bag_gyroscope
 from pilotage.experiments.recordings.drive import (
@@ -191,7 +191,7 @@ def bag_drive(
         sensors[GYROSCOPE] = GYROSCOPE_SHEET
     known = _truth(log, truth, clock, bag)
     gaps = int((np.diff(odometry_t_s) > HOLD_S).sum())
-    steps_s = np.maximum(np.diff(clock), 1e-3)
+    steps_s = _periods_s(clock)
     return RecordedDrive(
         log.name.split(".")[0],
         None,
@@ -211,7 +211,7 @@ def bag_drive(
         gaps,
         (),
         sideways_m=moves[:, 1],
-        part_var=_part_var(odometry_t_s, odometry, clock),
+        part_var=_part_var(odometry_t_s, odometry, clock, np.isin(clock, events)),
         scans=scans,
         scan_at=scan_at,
         chart=chart,
@@ -299,24 +299,43 @@ def _moves(poses: FloatArray) -> FloatArray:
     return np.concatenate([np.zeros((1, 3)), np.column_stack([along, aside, turn])])
 
 
-def _part_var(t_s: FloatArray, poses: FloatArray, clock: FloatArray) -> FloatArray:
+def _periods_s(t_s: FloatArray) -> FloatArray:
+    """(M - 1,) times between readings, none shorter than on the mean.
+
+    Readings that are stamped when they arrive come in bursts after each pause: what lies a millisecond apart
+    there was driven in a usual period.
+    """
+    periods_s = np.diff(t_s)
+    return np.maximum(periods_s, max(float(np.minimum(periods_s, HOLD_S).mean()), 1e-3))
+
+
+def _part_var(t_s: FloatArray, poses: FloatArray, clock: FloatArray, read: BoolArray) -> FloatArray:
     """(K, 3) variances of which part of an increment of slow odometry the steps are: ahead, aside, turn.
 
     Between two poses (M, 3) of the odometry the way is taken to be even. It is not where the robot sets out,
     brakes or turns; by how much its rates change to the next increments tells, as a Brownian bridge
-    q t (1 - t / T) of a step of length t.
+    q t (1 - t / T) of a stretch of length t. What a reading adds is of the stretches since the one before
+    (``read``, (K,)): steps in between that the clock alone asked for are parts of a whole that is known.
     """
     out = np.zeros((len(clock), 3))
-    periods_s = np.maximum(np.diff(t_s), 1e-3)
-    changes = np.diff(_moves(poses)[1:] / periods_s[:, None], axis=0) ** 2
+    changes = np.diff(_moves(poses)[1:] / _periods_s(t_s)[:, None], axis=0) ** 2
     if not len(changes):
         return out
+    periods_s = np.maximum(np.diff(t_s), 1e-3)
     most = np.maximum(np.concatenate([changes[:1], changes]), np.concatenate([changes, changes[-1:]]))
-    steps_s = np.diff(clock)
-    within = np.searchsorted(t_s, clock[:-1] + 0.5 * steps_s, side="right") - 1
-    within = np.clip(within, 0, len(periods_s) - 1)
-    share = np.maximum(1.0 - steps_s / periods_s[within], 0.0)
-    out[1:] = PART_SHARE * most[within] * (periods_s[within] * steps_s * share)[:, None]
+
+    def bridge(within: IntArray, stretch_s: FloatArray) -> FloatArray:
+        whole_s = periods_s[within]
+        parts_s2 = stretch_s * np.maximum(whole_s - stretch_s, 0.0)
+        return np.asarray(PART_SHARE * most[within] * parts_s2[:, None])
+
+    at_s = clock[read]
+    last = len(periods_s) - 1
+    ends = np.clip(np.searchsorted(t_s, at_s[1:], side="left") - 1, 0, last)
+    begins = np.clip(np.searchsorted(t_s, at_s[:-1], side="right") - 1, 0, last)
+    same = (begins == ends)[:, None]
+    rest = bridge(begins, t_s[begins + 1] - at_s[:-1]) + bridge(ends, at_s[1:] - t_s[ends])
+    out[np.flatnonzero(read)[1:]] = np.where(same, bridge(ends, np.diff(at_s)), rest)
     return out
 
 

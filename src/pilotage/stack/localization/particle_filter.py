@@ -28,6 +28,7 @@ from pilotage.stack.knowledge import RobotKnowledge
 from pilotage.stack.localization.gyro_odometry import GyroOdometry
 from pilotage.stack.localization.likelihood_field import LikelihoodField
 from pilotage.stack.localization.localizer import LOCALIZERS, require_initial_pose
+from pilotage.stack.localization.odometry_doubt import OdometryDoubt
 from pilotage.stack.localization.odometry_prediction import OdometryBelief, OdometryPrediction
 from pilotage.stack.localization.odometry_watch import (
     LINEAR_RAD,
@@ -148,6 +149,7 @@ class ParticleFilterLocalizer:
         )
         self._motion = GyroOdometry(robot, self._odometry, self._prediction, journal)
         self._watch, self._check = OdometryWatch(robot, odometry), SelfCheck(refused_share=MOST_BESIDE)
+        self._doubt = OdometryDoubt()
         self._blind = bool(initial.cov[2, 2] > LINEAR_RAD**2)
         self._unexplained, self._found = 0, True
         self._moved, self._alike = (0.0, 0.0), 0
@@ -196,13 +198,16 @@ class ParticleFilterLocalizer:
         moments, seen = None, np.zeros((0, 2))
         if isinstance(scan, LidarScan):
             seen = self._points_of(scan.ranges_m)
+            self._move_apart()
             prior = self._unweighted()
             points = self._field.mapped(seen, prior[0])
             if not self._blind and self._walls_between.speak_against(*prior, seen):
                 self._check.alarm(t_s)
             if len(points) and not self._blind:
-                weighs = not self._tells_nothing_new()
+                weighs, moved = not self._tells_nothing_new(), self._moved
                 moments = self._weigh(points, prior[1]) if weighs else None
+                if moments is not None:
+                    self._doubt.tell(prior, moments[0], *moved)
                 self._judge(prior, prior[0] if moments is None else moments[0], points, t_s)
             elif self._check.lost(t_s) and len(seen) >= LEAST_SEEN:
                 self._check.alarm(t_s)  # what says nothing does not find it
@@ -234,6 +239,7 @@ class ParticleFilterLocalizer:
         initial = Belief(Pose2.from_array(place), np.diag(STDS**2))
         self._poses = _draw(initial, self._config.most_particles, self._rng)
         self._wanted, self._blind, self._alike = self._config.most_particles, False, 0
+        self._doubt.forget()
         return self._unweighted()
 
     def _move(self, odometry: OdometryIncrement) -> None:
@@ -270,6 +276,17 @@ class ParticleFilterLocalizer:
                 self._relocalization.forget()
             stds = np.sqrt([place_m2, place_m2, min(heading_rad2, MOST_HEADING_VAR)])
             self._poses += stds * self._rng.standard_normal(self._poses.shape)
+            self._poses[:, 2] = wrap_array_to_pi(self._poses[:, 2])
+
+    def _move_apart(self) -> None:
+        """By what the odometry is not believed."""
+        stds = self._doubt.stds
+        if stds is not None:
+            if self._relocalization is not None:
+                self._relocalization.forget()
+            ahead, aside, turn = stds[:, None] * self._rng.standard_normal((3, self._poses.shape[0]))
+            c, s = np.cos(self._poses[:, 2]), np.sin(self._poses[:, 2])
+            self._poses += np.column_stack([c * ahead - s * aside, s * ahead + c * aside, turn])
             self._poses[:, 2] = wrap_array_to_pi(self._poses[:, 2])
 
     def _tells_nothing_new(self) -> bool:
@@ -359,6 +376,7 @@ class ParticleFilterLocalizer:
         if self._check.lost(t_s) or prior[1][0, 0] + prior[1][1, 1] > UNSURE_M**2:
             self._found = False
         as_usual = self._explained.tell(share, self._found, weight)
+        self._doubt.judge(as_usual)
         if as_usual:
             self._found = True
         elif not self._found:
