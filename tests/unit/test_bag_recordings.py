@@ -71,6 +71,22 @@ def test_scans_are_localized_alike_in_every_form(
     assert len(lines) == len(window.trace["t_s"])
 
 
+def test_a_recording_of_which_nobody_knows_where_it_begins(
+    museum: tuple[pl.Run, dict[str, Path]], tmp_path: Path
+) -> None:
+    """The filter finds itself in the map; errors, and the path by the recording's clock, begin there."""
+    run = pl.localize(museum[1]["mcap"], map="museum", start="unknown", localizer="ekf-walls", out=tmp_path)
+    assert run.success
+    assert 0.5 < run.metrics["found_after_s"] < 12.0
+    assert run.metrics["position_rmse_m"] < 0.05
+    assert 0.2 < run.metrics["localized_share"] < 0.99
+    lines = (run.folder / "trajectory.tum").read_text().splitlines()
+    assert len(lines) == round(run.metrics["localized_share"] * len(run.trace["t_s"]))
+    assert run.report().is_file()
+    with pytest.raises(InputError, match="start: expected x, y, theta or 'unknown', found 'home'"):
+        pl.localize(museum[1]["mcap"], map="museum", start="home", out=tmp_path)  # type: ignore[arg-type]
+
+
 def test_a_run_folder_holds_the_scans_and_odometry_of_its_bag(
     museum: tuple[pl.Run, dict[str, Path]],
 ) -> None:
@@ -272,6 +288,10 @@ def test_a_bags_camera_is_calibrated_by_its_fiducials(table: Path, tmp_path: Pat
         ("localize {bag} --map museum --topic /plan", "expected one of sensor_msgs/msg/LaserScan"),
         ("localize {bag} --map museum --truth /nowhere", "expected the topic /nowhere of"),
         ("localize {bag} --map museum --start 1,1", "--start: expected X,Y,TH"),
+        (
+            "localize {bag} --map museum --start unknown --localizer dead-reckoning",
+            "expected --start X,Y,TH or the truth at the begin, found neither; of a map with walls",
+        ),
         ("localize {bag} --map museum --start 1,1,0 --from 900", "readings in common"),
         ("localize {bag} --map museum --robot 2", "--robot is for --format mrclam"),
         (

@@ -6,7 +6,7 @@ import math
 import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -14,6 +14,9 @@ from pilotage.cli.options import Json, Out, Overrides, Plugins
 from pilotage.cli.output import print_columns, print_json, print_line, stdout_for_json
 from pilotage.cli.plan import parse_pose
 from pilotage.core.errors import InputError, unknown_name
+
+if TYPE_CHECKING:
+    from pilotage.core.types import Pose2
 
 NAMED = 5
 """Rows of a log that were left out and are named; the others are counted."""
@@ -46,7 +49,10 @@ def localize(
     ] = None,
     start: Annotated[
         str | None,
-        typer.Option(metavar="X,Y,TH", help="bag: where the robot was; default where the truth says."),
+        typer.Option(
+            metavar="X,Y,TH|unknown",
+            help="bag: where the robot was; default where the truth says, else unknown.",
+        ),
     ] = None,
     topics: Annotated[
         list[str] | None,
@@ -90,7 +96,6 @@ def localize(
     plugin: Plugins = None,  # noqa: ARG001 - loaded while the options are read
 ) -> int:
     """Run a localizer over a recording and score it, against its truth where that is known."""
-    from pilotage.core.types import Pose2
     from pilotage.experiments.recordings.form import FORMATS, Setting, told_format
 
     if form is not None and form not in FORMATS:
@@ -103,7 +108,7 @@ def localize(
     setting = Setting(
         map_,
         landmarks,
-        None if start is None else Pose2(*_start(start)),
+        None if start is None else _start(start),
         tuple(topics or ()),
         truth,
         from_s,
@@ -140,11 +145,15 @@ def localize(
     return 0 if result.metrics["success"] else 1
 
 
-def _start(text: str) -> tuple[float, ...]:
+def _start(text: str) -> Pose2 | Literal["unknown"]:
+    if text == "unknown":
+        return "unknown"
+    from pilotage.core.types import Pose2
+
     values = parse_pose(text, "--start")
     if len(values) != 3:
-        raise InputError(f"--start: expected X,Y,TH in metres and radians, found '{text}'")
-    return values
+        raise InputError(f"--start: expected X,Y,TH in metres and radians, or unknown, found '{text}'")
+    return Pose2(*values)
 
 
 def _text(value: object) -> str:

@@ -16,20 +16,27 @@ LOST_M = 2.0
 
 
 def log_metrics(
-    trace: Mapping[str, FloatArray], localized: BoolArray
+    trace: Mapping[str, FloatArray], localized: BoolArray, *, told: bool = True
 ) -> tuple[dict[str, object], FloatArray]:
     """Metrics of a trace at the scored steps, and its (N,) NEES, nan where the truth is not known.
 
-    ``localized`` (N,): whether the localizer held itself for localized.
+    ``localized`` (N,): whether the localizer held itself for localized. Who was ``told`` no start claims no
+    pose before it has found one: errors count from then on.
     A step whose truth is nan (a gap) is left out and counted in ``steps_without_truth``.
     """
     truth, estimate = poses(trace, "true"), poses(trace, "est")
     known = np.isfinite(truth).all(axis=1)
+    found = np.maximum.accumulate(localized)
     values = np.full(known.shape[0], np.nan)
     metrics: dict[str, object] = {
         "scored_steps": int(known.sum()),
         "steps_without_truth": int((~known).sum()),
     }
+    if not told:
+        metrics["lost"] = not localized[-1]
+        known &= found
+        if found.any():
+            metrics["found_after_s"] = float(trace["t_s"][np.argmax(found)] - trace["t_s"][0])
     if known.any():
         values[known] = nees(truth[known], estimate[known], covariances(trace)[known])
         errors = pose_errors(truth[known], estimate[known])

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 from pilotage.core import given
-from pilotage.core.errors import unknown_name
+from pilotage.core.errors import InputError, unknown_name
 from pilotage.core.given import FilePath
 from pilotage.core.interruptions import interruptible
 from pilotage.core.types import FloatArray, Pose2
@@ -20,7 +20,7 @@ def localize(
     *,
     map: FilePath | None = None,  # noqa: A002 - the word for it
     landmarks: FilePath | None = None,
-    start: Sequence[float] | FloatArray | None = None,
+    start: Sequence[float] | FloatArray | Literal["unknown"] | None = None,
     topics: Sequence[str] = (),
     truth: FilePath | None = None,
     from_s: float = 0.0,
@@ -42,7 +42,8 @@ def localize(
     map, landmarks
         bag: what to localize in: a shipped map's name or a map file, for scans; a table id, x_m, y_m.
     start
-        bag: x, y, theta at the first reading; None: where the truth says.
+        bag: x, y, theta at the first reading, or "unknown": the localizer has to find itself. None: where
+        the truth says, else unknown.
     topics
         bag: scans, odometry, velocities, gyroscope or landmarks by name, where the usual ones are not meant.
     truth
@@ -82,7 +83,7 @@ def localize(
     setting = Setting(
         None if map is None else str(given.path("map", map)),
         None if landmarks is None else given.path("landmarks", landmarks),
-        None if start is None else Pose2.from_array(given.array("start", start, 3)),
+        _start(start),
         given.words("topics", topics),
         None if truth is None else str(given.path("truth", truth)),
         given.number("from_s", from_s),
@@ -99,3 +100,13 @@ def localize(
         setting=setting,
     )
     return Run(result.run_dir)
+
+
+def _start(start: Sequence[float] | FloatArray | str | None) -> Pose2 | Literal["unknown"] | None:
+    if start is None:
+        return None
+    if isinstance(start, str):
+        if start != "unknown":
+            raise InputError(f"start: expected x, y, theta or 'unknown', found '{start}'")
+        return "unknown"
+    return Pose2.from_array(given.array("start", start, 3))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -104,7 +105,7 @@ def bag_drive(
     log: Path,
     chart: WorldMap,
     *,
-    start: Pose2 | None = None,
+    start: Pose2 | Literal["unknown"] | None = None,
     topics: Sequence[str] = (),
     truth: str | None = None,
     from_s: float = 0.0,
@@ -119,7 +120,8 @@ def bag_drive(
     Parameters
     ----------
     start
-        Where the robot was at the first reading; None: where ``truth`` says.
+        Where the robot was at the first reading, or that this is unknown; None: where ``truth`` says, if it
+        does.
     topics
         Of a bag, where the usual ones are not meant.
     truth
@@ -215,11 +217,18 @@ def bag_drive(
         scans=scans,
         scan_at=scan_at,
         chart=chart,
-        start=start,
+        start=_told_start(start, known[0]),
         turning=turning,
         motion=limits(np.hypot(moves[1:, 0], moves[1:, 1]) / steps_s, moves[1:, 2] / steps_s),
         warnings=tuple(said),
     )
+
+
+def _told_start(start: Pose2 | Literal["unknown"] | None, truth: FloatArray) -> Pose2 | None:
+    """What the robot is told: the pose that is given, else the truth (3,) where it is known."""
+    if start is None:
+        return Pose2.from_array(truth) if np.isfinite(truth).all() else None
+    return start if isinstance(start, Pose2) else None
 
 
 def _laser(log: Path, chart: WorldMap, wanted: BagTopics, bag: bool) -> LaserLog | None:

@@ -70,7 +70,7 @@ class RecordedDrive:
     chart
         The robot's map; None: landmarks alone.
     start
-        Where the robot is told that it begins; None: at the truth.
+        Where the robot is told that it begins; None: nowhere, it has to find itself.
     motion
         How fast it may be, by what is known of it.
     warnings
@@ -203,6 +203,7 @@ def mrclam_drive(folder: Path, robot: int) -> RecordedDrive:
         log.misread,
         limits(log.speed_m_s, log.turn_rate_rad_s),
         stale=log.stale,
+        start=Pose2.from_array(truth[0]),
     )
 
 
@@ -258,6 +259,7 @@ def aer1513_drive(path: Path, max_range_m: float | None = None) -> RecordedDrive
         (),
         limits(log.speed_m_s, log.turn_rate_rad_s),
         (log.speed_var_m2_s2 * step, log.turn_rate_var_rad2_s2 * step),
+        start=Pose2.from_array(truth[0]) if np.isfinite(truth[0]).all() else None,
     )
 
 

@@ -23,7 +23,7 @@ from pilotage.sensors.readings import Readings
 from pilotage.stack.interface import Belief, BeliefStatus, StackStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge
-from pilotage.stack.localization.localizer import LOCALIZERS, Localizer
+from pilotage.stack.localization.localizer import LOCALIZERS, Localizer, StartNeededError
 
 START_STDS = (0.05, 0.05, 0.03)
 """Metres, metres and radians of the start, whose mean is the true pose."""
@@ -32,22 +32,30 @@ SUMS = ("beacons_seen", "beacons_accepted", "nis", "nis_dof", "nis_expected")
 
 
 def build_localizer(drive: RecordedDrive, name: str, config: Config) -> tuple[Localizer, Journal]:
-    """The localizer with what the recorded robot knew before it started, and the journal that it writes."""
-    start = drive.truth[0] if drive.start is None else drive.start.as_array()
-    if not np.isfinite(start).all():
-        raise InputError(
-            f"{drive.name}: expected --start X,Y,TH or the truth at the begin, found neither"
-            if drive.chart is not None
-            else f"{drive.name}: expected the truth at the begin, found a gap there"
-        )
-    initial = Belief(Pose2.from_array(start), np.diag(np.square(START_STDS)))
+    """The localizer with what the recorded robot knew before it started, and the journal that it writes.
+
+    Raises
+    ------
+    InputError
+        Where nobody knows the start, and the localizer does not find itself.
+    """
+    bounds_m = bounds_of(drive)
+    sure = np.diag(np.square(START_STDS))
+    initial = Belief.anywhere(bounds_m) if drive.start is None else Belief(drive.start, sure)
     dt_s = float(np.median(np.diff(drive.t_s))) if drive.chart is not None else float(drive.t_s[1])
     robot = RobotKnowledge(Footprint.disc(0.2), drive.motion, drive.sensors, dt_s, RandomStreams(0))
-    bounds_m = bounds_of(drive)
     floor = SegmentMap(np.zeros((0, 4)), np.zeros((0, 3)), bounds_m)
     chart = drive.chart or WorldMap(drive.name, bounds_m, floor, landmarks=drive.landmarks)
     journal = Journal()
-    return LOCALIZERS.entry(name).factory(config, robot, chart, initial, journal), journal
+    try:
+        return LOCALIZERS.entry(name).factory(config, robot, chart, initial, journal), journal
+    except StartNeededError:
+        raise InputError(
+            f"{drive.name}: expected --start X,Y,TH or the truth at the begin, found neither; of a map with "
+            "walls, and of scans, particle-filter needs none"
+            if drive.chart is not None
+            else f"{drive.name}: expected the truth at the begin, found a gap there"
+        ) from None
 
 
 class _Listener:

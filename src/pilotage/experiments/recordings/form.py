@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import Pose2
@@ -24,14 +25,14 @@ class Setting:
     landmarks
         A CSV table id, x_m, y_m; None: those of the map.
     start
-        Where the robot was; None: where the truth says.
+        Where the robot was, or that this is unknown; None: where the truth says, if it does.
     topics, truth, from_s, to_s
         As ``bag_drive`` has them.
     """
 
     map: str | None = None
     landmarks: Path | None = None
-    start: Pose2 | None = None
+    start: Pose2 | Literal["unknown"] | None = None
     topics: tuple[str, ...] = ()
     truth: str | None = None
     from_s: float = 0.0

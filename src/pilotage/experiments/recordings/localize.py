@@ -12,7 +12,7 @@ import numpy as np
 import yaml
 
 from pilotage.core.errors import InputError
-from pilotage.core.types import BoolArray, FloatArray
+from pilotage.core.types import BoolArray, FloatArray, Pose2
 from pilotage.evaluation.log_metrics import log_metrics
 from pilotage.evaluation.metrics import METRICS
 from pilotage.experiments.leavings import drawn_grid, drawn_walls
@@ -74,7 +74,7 @@ def localize_log(
     followed = follow(drive, *build_localizer(drive, localizer, config))
     trace, loop_s = followed.trace, followed.took_s
     steps = drive.t_s.shape[0] - 1
-    scores, trace["nees"] = log_metrics(trace, followed.localized)
+    scores, trace["nees"] = log_metrics(trace, followed.localized, told=drive.start is not None)
     metrics: dict[str, object] = {
         "mission": f"localize-{drive.name}-{localizer}",
         **_verdict(scores, followed.localized),
@@ -117,6 +117,12 @@ def _verdict(scores: dict[str, object], localized: BoolArray) -> dict[str, objec
     return {"success": bool(localized[-1]), "reason": told}
 
 
+def _first_known(followed: Followed) -> FloatArray:
+    """(3,) the first pose that the localizer was sure of, or its very first."""
+    trace, at = followed.trace, int(np.argmax(followed.localized))
+    return np.array([trace[f"est_{part}"][at] for part in ("x_m", "y_m", "theta_rad")])
+
+
 def _write(
     out: Path,
     drive: RecordedDrive,
@@ -128,13 +134,13 @@ def _write(
     settings = yaml.safe_dump({"recording": drive.name, "stack": {"localizer": localizer}}, sort_keys=False)
     chart, trace = drive.chart, followed.trace
     digest = hashlib.sha256(f"{settings}{drive.begin_s}{len(drive.t_s)}".encode()).hexdigest()[:8]
-    x, y, theta = drive.truth[0].tolist() if drive.start is None else drive.start.as_array().tolist()
+    begin = drive.start or Pose2.from_array(_first_known(followed))
     world = World(
         segments_m=np.zeros((0, 4)) if chart is None else drawn_walls(chart),
         circles_m=np.zeros((0, 3)) if chart is None else chart.walls.circles_m,
         bounds_m=bounds_of(drive),
         landmarks=landmarks_of(drive.landmarks.ids, drive.landmarks.points_xy_m),
-        robots=(RobotOutline(start=(x, y, theta)),),
+        robots=(RobotOutline(start=(begin.x_m, begin.y_m, begin.theta_rad)),),
     )
     files = RunFiles(
         trace_of(trace),

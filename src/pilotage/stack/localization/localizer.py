@@ -126,16 +126,20 @@ def require_walls(chart: WorldMap, name: str) -> None:
         )
 
 
+class StartNeededError(InputError):
+    """A localizer that cannot find its pose by itself was told none."""
+
+
 def require_initial_pose(initial: Belief, name: str) -> None:
     """Refuse a start without a pose.
 
     Raises
     ------
-    InputError
+    StartNeededError
         If the initial pose is unknown; said by localizers that cannot find it by themselves.
     """
     if initial.status is BeliefStatus.LOST:
-        raise InputError(
+        raise StartNeededError(
             f"{name}: expected an initial pose, found stack.initial.known = false; set it to true or take "
             "a localizer that finds its pose by itself, such as ekf-walls"
         )
