@@ -59,8 +59,8 @@ class MissionEnv(gymnasium.Env[Any, Any]):
     Raises
     ------
     InputError
-        Where the mission has several robots, no goal or one where it starts, a sensor is called ``goal``, or one that declares no
-        numbers is silent.
+        Where the mission has several robots, no goal or one where it starts, a sensor is called ``goal``, or
+        one that declares no numbers is silent.
     """
 
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 - as Gymnasium declares it
