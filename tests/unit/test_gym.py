@@ -174,6 +174,8 @@ def test_a_sensor_of_ones_own_is_observed() -> None:
 def test_what_cannot_be_learned_is_one_line() -> None:
     with pytest.raises(pl.InputError, match=r"expected a mission with world\.goal"):
         gymnasium.make("pilotage/romi-explore-v0")
+    with pytest.raises(pl.InputError, match="an episode would be over before a step"):
+        gymnasium.make("pilotage/museum-laps-v0")
     with pytest.raises(pl.InputError, match="one robot"):
         gymnasium.make(gym.OWN, mission={"extends": "museum-1", "mission": "two", "robots": [{}, {}]})
 

@@ -101,6 +101,18 @@ def test_a_command_is_looked_at_by_what_the_laser_shows_as_far_as_it_takes_to_st
     assert angular.allows(Twist(-0.3, 0.0))
 
 
+@pytest.mark.parametrize(("moves_m", "held_s"), [(0.0, 2.9), (0.05, 0.5)])
+def test_who_gets_on_is_held_by_nothing(moves_m: float, held_s: float) -> None:
+    """At 1.5 m/s it was refused now and then: after 2 s it took a step clear, at a tenth of its speed."""
+    word, seen = word_of({"lidar": ALL_ROUND} | TOLD), scan_of(ALL_ROUND, BESIDE)
+    held = []
+    for k in range(1, 31):
+        hears(word, 0.1 * k, lidar=seen, odometry=OdometryIncrement(moves_m, 0.0))
+        assert not word.allows(Twist(0.3, 1.5))
+        held.append(word.held_s)
+    assert max(held) == pytest.approx(held_s)
+
+
 def test_what_was_shown_last_counts_where_no_scan_comes() -> None:
     """Of scans of which three tenths were lost four were so in a row: who had stood drove into the wall."""
     word = rolls(word_of({"lidar": LidarConfig()} | TOLD), lidar=scan_of(LidarConfig(), AHEAD))

@@ -13,6 +13,7 @@ from pilotage.core.types import STOP, Pose2, Twist
 from pilotage.kernels.geometry.motion import exact_arc
 from pilotage.kernels.scans.rays import fan_ranges
 from pilotage.models.footprint import Footprint
+from pilotage.models.motion.differential_drive import DifferentialDriveConfig
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, OdometryIncrement, Readings
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
@@ -85,6 +86,28 @@ def test_who_asks_for_the_same_in_vain_is_taken_clear_of_what_stops_it() -> None
         driver.step(asked)
         assert driver.scan_m().min() > 0.2
     assert driver.scan_m().min() > nearest_m + 0.03
+
+
+def test_who_rolls_goes_on_no_faster_where_it_may_not_as_fast_as_asked() -> None:
+    """With weak brakes who was refused more speed, or a turn, braked instead, again and again."""
+    motion = DifferentialDriveConfig(max_speed_m_s=1.0, max_acceleration_m_s2=0.4)
+    sensors = {"lidar": ALL_ROUND, "odometry": WheelOdometryConfig(rate_hz=10.0)}
+    told = replace(told_of().robot, motion=motion, sensors=sensors, dt_s=DT_S, footprint=Footprint.disc(0.3))
+    word = LastWord(told)
+    step_clear = StepClear(told, word)
+
+    def left(t_s: float, command: Twist, ahead_m: float) -> Twist:
+        wall, ends = [[ahead_m, -9.0, ahead_m, 9.0]], (ALL_ROUND.beam_step_rad, 720, 20.0)
+        scan = fan_ranges(0.0, 0.0, -math.pi, *ends, np.array(wall), np.zeros((0, 3)))
+        moved = OdometryIncrement(0.07 if t_s > 0.1 else 0.0, 0.0)
+        word.take_in(Readings(t_s, {"lidar": LidarScan(scan), "odometry": moved}))
+        return word.leaving(step_clear.instead_of(command, t_s))
+
+    for step in range(1, 40):
+        assert left(0.1 * step, Twist(0.7, 0.0), 1.06 + 0.07 * (40 - step)) == Twist(0.7, 0.0)
+    assert left(4.0, Twist(1.0, 0.0), 1.06) == Twist(0.7, 0.0)
+    braked = left(4.1, Twist(1.0, 0.0), 0.9)
+    assert braked.v_m_s == pytest.approx(0.66)
 
 
 def test_what_is_allowed_leaves_as_it_is() -> None:

@@ -59,8 +59,8 @@ class MissionEnv(gymnasium.Env[Any, Any]):
     Raises
     ------
     InputError
-        Where the mission has several robots or no goal, a sensor is called ``goal``, or one that declares no
-        numbers is silent.
+        Where the mission has several robots, no goal or one where it starts, a sensor is called ``goal``, or
+        one that declares no numbers is silent.
     """
 
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 - as Gymnasium declares it
@@ -146,12 +146,23 @@ def check_goal(mission: Mission) -> None:
     Raises
     ------
     InputError
-        Where a mission has several robots or no goal.
+        Where a mission has several robots, no goal, or one that it starts at.
     """
     if mission.robots:
         raise InputError(f"gymnasium: expected a mission with one robot, found {len(mission.robots)}")
-    if mission.goal_of(mission.members[0]) is None and mission.world.random_goal is None:
+    if mission.world.random_goal is not None:
+        return
+    start, goal = mission.start_of(mission.members[0]), mission.goal_of(mission.members[0])
+    if goal is None:
         raise InputError(f"gymnasium: expected a mission with world.goal, found '{mission.mission}'")
+    if start is None:
+        return
+    away_m = math.hypot(goal.x_m - start.x_m, goal.y_m - start.y_m)
+    if away_m <= goal.tolerance_m:
+        raise InputError(
+            f"gymnasium: expected world.goal elsewhere than the start of '{mission.mission}', found it "
+            f"{away_m:g} m away: an episode would be over before a step"
+        )
 
 
 def goal_of(drawn: Mission) -> GoalConfig:

@@ -93,6 +93,21 @@ class ArcStop:
             approach(going.lateral_m_s, command.lateral_m_s, motion.top_lateral_m_s, slows),
         )
 
+    def no_faster(self, command: Twist) -> tuple[Twist, ...]:
+        """Of a command to one that rolls that way: no faster than it rolls, turning as it comes to or as now.
+
+        None to one that brakes within a step, nor to one that steers wheels.
+        """
+        going, asked_m_s = self._going, math.hypot(command.v_m_s, command.lateral_m_s)
+        speed_m_s = math.hypot(going.v_m_s, going.lateral_m_s)
+        same_way = going.v_m_s * command.v_m_s + going.lateral_m_s * command.lateral_m_s > 0.0
+        if self._steers or speed_m_s <= self._slows_m_s or not same_way:
+            return ()
+        share = min(1.0, speed_m_s / asked_m_s)
+        v_m_s, lateral_m_s = share * command.v_m_s, share * command.lateral_m_s
+        turns = self.follows(command).w_rad_s, going.w_rad_s
+        return tuple(Twist(v_m_s, w_rad_s, lateral_m_s) for w_rad_s in turns)
+
     def _reaches(self, command: Twist) -> bool:
         """Whether all its rates are as told within a step."""
         going = self._going

@@ -10,8 +10,8 @@ from pilotage.stack.control.arc_stop import ArcStop
 from pilotage.stack.control.scan_guard import NOTHING, ScanGuard
 from pilotage.stack.knowledge import RobotKnowledge
 
-AGAIN_S = 1.0
-"""Refused again so soon it is for the same thing."""
+AGAIN_S, SAME_M = 1.0, 0.3
+"""Refused again so soon, and so near to where it was refused first, it is for the same thing."""
 
 
 class LastWord:
@@ -31,7 +31,7 @@ class LastWord:
         self._guard, self._arc_stop = ScanGuard(robot), ArcStop(robot)
         self._left: Twist | None = None
         self._t_s = self._refused_s = 0.0
-        self._since_s = math.inf
+        self._since_s, self._since_at = math.inf, self._guard.place_m
         self.shown_m: FloatArray = NOTHING
 
     def take_in(self, readings: Readings) -> None:
@@ -57,10 +57,15 @@ class LastWord:
             self._left = command
             return True
         self._left, self.shown_m = STOP, touched_m
-        if self._t_s - self._refused_s > AGAIN_S:
-            self._since_s = self._t_s
+        elsewhere = math.dist(self._since_at, self._guard.place_m) > SAME_M
+        if elsewhere or self._t_s - self._refused_s > AGAIN_S:
+            self._since_s, self._since_at = self._t_s, self._guard.place_m
         self._since_s, self._refused_s = min(self._since_s, self._t_s), self._t_s
         return False
+
+    def no_faster(self, command: Twist) -> tuple[Twist, ...]:
+        """What to ask about instead of a refused command while the robot rolls, the most like it first."""
+        return self._arc_stop.no_faster(command)
 
     def leaving(self, command: Twist) -> Twist:
         """What leaves in this step for a command: itself, or of a stop the braking along the arc."""
@@ -74,7 +79,7 @@ class LastWord:
 
     @property
     def held_s(self) -> float:
-        """For how long it has refused now, again and again; 0 where it did not just now."""
+        """For how long it has refused now, again and again in one place; 0 where it did not just now."""
         held = self._t_s - self._refused_s <= AGAIN_S
         return max(self._t_s - self._since_s, 0.0) if held else 0.0
 

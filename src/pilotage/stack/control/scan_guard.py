@@ -134,6 +134,11 @@ class ScanGuard:
         for laser in self._lasers:
             laser.take_in(readings, self._here)
 
+    @property
+    def place_m(self) -> tuple[float, float]:
+        """Where the robot is by its own motion, seen from where it began; where it has a laser."""
+        return self._here[0], self._here[1]
+
     def sent(self, command: Command) -> None:
         """A command left in this step."""
         if self._lasers:

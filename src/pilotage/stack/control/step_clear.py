@@ -33,6 +33,9 @@ class StepClear:
     than the last word lets anything pass. It does not know of that, and from the same place asks for the same
     for ever. From some way off it finds another way in, or gives the gap up.
 
+    Who rolls asks for something else in the next step, and with weak brakes it takes long to make good for a
+    stop of one step: it goes on no faster than it rolls, turning as far as may be, where that has room.
+
     Backs only where some laser looks. Where no step leads clear the robot stands.
     """
 
@@ -47,7 +50,7 @@ class StepClear:
         self._step, self._until_s = STOP, -math.inf
 
     def instead_of(self, command: Twist, t_s: float, may: Callable[[Twist], bool] = _anything) -> Twist:
-        """The command if it may leave; where it has not for a while a step clear, else a stop.
+        """The command if it may leave; else the same no faster, after a while a step clear, else a stop.
 
         ``may`` says what else a step has to leave room for.
         """
@@ -56,6 +59,9 @@ class StepClear:
         self._until_s = -math.inf
         if self._last_word.allows(command):
             return command
+        for slower in self._last_word.no_faster(command):
+            if self._may(slower, may):
+                return slower
         if self._last_word.held_s < PATIENCE_S:
             return STOP
         step = self.found(may)

@@ -81,6 +81,7 @@ class InvariantEkfLocalizer:
         )
         self._motion = GyroOdometry(robot, self._odometry, self._prediction, journal)
         self._ids, self._points = chart.landmarks.by_id()
+        self._known = frozenset(self._ids.tolist())
         told = config.measurement_var_scale * np.array([seer.range_var_m2, seer.bearing_var_rad2])
         self._R = np.diag(np.maximum(told, LEAST_VAR))
         self._gate_probability = config.gate
@@ -142,7 +143,7 @@ class InvariantEkfLocalizer:
             self._gate,
             self._refused,
         )
-        known = int(np.isin(ids, self._ids).sum()) if len(ids) else 0
+        known = sum(one in self._known for one in ids.tolist())
         self._check.tell(readings.t_s, known, accepted, nis, accepted * self._expected_nis)
         rover_filter.moments(self._state, self._cov, self._anchor, self._points, self._mean, self._spread)
         lost = self._check.lost(readings.t_s) or self._spread[2, 2] > LINEAR_RAD**2
