@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pilotage.kernels.lines.pose_hypotheses import _long_enough
+from pilotage.kernels.lines.pose_hypotheses import _about, _long_enough
 from pilotage.kernels.lines.wall_candidates import overlap_share
 
 SMALL = st.floats(-4.0, 4.0)
@@ -47,3 +47,17 @@ def test_no_wall_that_a_line_overlaps_is_left_out(
     assert len(kept) == 1 or share < least
     # It does sift: what is shorter by far is left out.
     assert not len(_long_enough(segment[None, :], end, 0.0, least)) or wall_m >= 0.89 * least * line_m
+
+
+@given(st.lists(st.floats(-math.pi, math.pi), max_size=30), st.floats(-math.pi, math.pi), st.floats(0.0, 3.0))
+def test_walls_at_the_right_angle_are_all_found_in_their_order(
+    angles: list[float], angle: float, tolerance: float
+) -> None:
+    """Sorted by their angles, which go on beyond half a turn: as if each had been looked at."""
+    all_rad = np.array(angles)
+    by_angle = np.argsort(all_rad)
+    found = _about(all_rad[by_angle], by_angle, angle, tolerance + 1e-9)
+    off = np.abs((all_rad - angle + math.pi) % (2.0 * math.pi) - math.pi)
+    assert set(np.flatnonzero(off <= tolerance)) <= set(found)
+    assert (off[found] <= tolerance + 1e-6).all()
+    assert (np.diff(found) > 0).all()

@@ -63,11 +63,17 @@ def pair_poses(
     between = wrap(lines[1, 1] - lines[0, 1])
     firsts = _long_enough(segments, ends[0], slack, least_overlap)
     seconds = _long_enough(segments, ends[1], slack, least_overlap)
+    angles = np.empty(2 * seconds.shape[0])
+    for b in range(angles.shape[0]):
+        angles[b] = wrap(walls[seconds[b // 2], 1] + (b % 2) * math.pi)
+    by_angle = np.argsort(angles)
+    angles = angles[by_angle]
     for a in range(2 * firsts.shape[0]):
         first, flip_a = firsts[a // 2], a % 2
         angle_a = walls[first, 1] + flip_a * math.pi
         rho_a = walls[first, 0] * (1.0 - 2.0 * flip_a)
-        for b in range(2 * seconds.shape[0]):
+        # In a building of thousands of walls few are at the right angle.
+        for b in _about(angles, by_angle, wrap(angle_a + between), angle_tolerance + 1e-9):
             second, flip_b = seconds[b // 2], b % 2
             angle_b = walls[second, 1] + flip_b * math.pi
             error = wrap(angle_b - angle_a - between)
@@ -102,6 +108,23 @@ def pair_poses(
             out[count] = pose
             count += 1
     return count
+
+
+@kernel
+def _about(angles: FloatArray, places: IntArray, angle: float, tolerance: float) -> IntArray:
+    """Which of ``places``, in their own order, have an angle about the one asked for; ``angles`` rise."""
+    ends = np.zeros((3, 2), np.int64)
+    for k in range(3):
+        around = angle + 2.0 * math.pi * (k - 1)
+        ends[k, 0] = np.searchsorted(angles, around - tolerance)
+        ends[k, 1] = np.searchsorted(angles, around + tolerance)
+    found = np.empty((ends[:, 1] - ends[:, 0]).sum(), np.int64)
+    count = 0
+    for k in range(3):
+        for place in places[ends[k, 0] : ends[k, 1]]:
+            found[count] = place
+            count += 1
+    return np.sort(found)
 
 
 @kernel
