@@ -157,6 +157,17 @@ def test_odometry_is_calibrated_as_from_the_run_itself(
         found = pl.calibrate("odometry", place, truth=truth, out=tmp_path)
         for key in ("distance_scale", "angle_scale"):
             assert found[key]["value"] == pytest.approx(whole[key]["value"], rel=1e-3)
+    # By a path of its own, as SLAM leaves one: here the truth, with the bag's clock.
+    rows = museum[0].trace
+    lines = [
+        f"{t} {x} {y} 0 0 0 {math.sin(th / 2)} {math.cos(th / 2)}\n"
+        for t, x, y, th in zip(
+            *(rows[n] for n in ("t_s", "true_x_m", "true_y_m", "true_theta_rad")), strict=True
+        )
+    ]
+    (tmp_path / "own.tum").write_text("".join(lines))
+    found = pl.calibrate("odometry", bags["ros1"], truth=tmp_path / "own.tum", out=tmp_path)
+    assert found["distance_scale"]["value"] == pytest.approx(whole["distance_scale"]["value"], rel=1e-3)
 
 
 def test_which_part_of_a_slow_increment_is_whose_is_unsure_where_the_robot_turns() -> None:
@@ -309,7 +320,7 @@ def test_a_bags_camera_is_calibrated_by_its_fiducials(table: Path, tmp_path: Pat
         ("calibrate heading {bag}", "expected a topic of sensor_msgs/msg/Imu, found /cmd_vel"),
         ("calibrate range {bag}", "expected a robot that stands still"),
         ("calibrate range {still} --truth /truth", "--truth is for"),
-        ("calibrate odometry {bag} --topic /truth --truth /truth", "expected --truth TOPIC beside"),
+        ("calibrate odometry {bag} --topic /truth --truth /truth", "expected --truth TOPIC|FILE beside"),
         ("calibrate heading {still} --truth /truth", "expected a topic of sensor_msgs/msg/Imu, found /scan"),
         ("calibrate odometry {csv} --topic /odom", "expected a bag where topics are named"),
         ("evaluate {bag} {bag}", "expected two topics of the one bag"),

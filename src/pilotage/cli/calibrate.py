@@ -61,8 +61,8 @@ def calibrate(
     truth: Annotated[
         str | None,
         typer.Option(
-            metavar="TOPIC",
-            help="odometry, heading, commands, of bags: the true poses; /tf:PARENT:CHILD too.",
+            metavar="TOPIC|FILE",
+            help="odometry, heading, commands, of bags: the true poses; /tf:PARENT:CHILD or a TUM file too.",
         ),
     ] = None,
     landmarks: Annotated[

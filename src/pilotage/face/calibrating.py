@@ -65,7 +65,7 @@ def calibrate(
     robots: Sequence[int] = (),
     leave_one_out: bool = False,
     topics: Sequence[str] = (),
-    truth: str | None = None,
+    truth: FilePath | None = None,
     landmarks: FilePath | None = None,
     out: FilePath = "runs",
 ) -> Calibration:
@@ -86,8 +86,8 @@ def calibrate(
     robots, leave_one_out
         commands: from these robots of the recordings only; a set without each recording in turn besides.
     topics, truth
-        Of bags: what is calibrated, where the usual one is not meant; odometry, heading, commands: the topic
-        of the truth.
+        Of bags: what is calibrated, where the usual one is not meant; odometry, heading, commands: the true
+        poses, a topic, ``/tf:PARENT:CHILD`` or a TUM file.
     landmarks
         commands, of bags: a CSV table id, x_m, y_m, by which the camera is calibrated too.
 
@@ -103,8 +103,7 @@ def calibrate(
     listed = logs if isinstance(logs, list | tuple) else [logs]
     places, target = [given.path("logs", log) for log in listed], given.folder("out", out)
     set, topics, seed = given.words("set", set), given.words("topics", topics), given.whole("seed", seed)  # noqa: A001
-    if truth is not None:
-        given.word("truth", truth)
+    true = None if truth is None else str(given.path("truth", truth))
     if what == "odometry":
         result = lab.odometry_from(
             places,
@@ -116,12 +115,12 @@ def calibrate(
             else given.number("--wheel-base", wheel_base_m, above=0.0),
             sensor=given.word("sensor", sensor),
             topics=topics,
-            truth=truth,
+            truth=true,
         )
     elif what == "range":
         result = lab.range_from(places, target, overrides=set, seed=seed, topics=topics)
     elif what == "heading":
-        result = lab.heading_from(places, target, axis=given.word("axis", axis), topics=topics, truth=truth)
+        result = lab.heading_from(places, target, axis=given.word("axis", axis), topics=topics, truth=true)
     else:
         from pilotage.experiments.calibrate_commands import commands_from
 
@@ -131,7 +130,7 @@ def calibrate(
             robots=given.indices("robots", robots, None).tolist(),
             leave_one_out=given.flag("leave_one_out", leave_one_out),
             topics=topics,
-            truth=truth,
+            truth=true,
             landmarks=None if landmarks is None else given.path("landmarks", landmarks),
         )
     return Calibration(result.answer, result.folder)

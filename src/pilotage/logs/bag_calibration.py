@@ -17,7 +17,6 @@ from pilotage.logs.bag_series import (
     headings,
     landmarks_in_base,
     read_odometry,
-    read_poses,
     read_series,
     topic_of,
 )
@@ -29,6 +28,7 @@ from pilotage.logs.mrclam import MrclamLog
 from pilotage.logs.odometry_steps import OdometryForm, OdometrySteps, carried_over
 from pilotage.logs.reckoning_mat import ReckoningLog
 from pilotage.logs.steady_csv import LEAST_ROWS, MOST_COLUMNS, Column
+from pilotage.logs.true_poses import true_poses
 from pilotage.maps.landmarks import Landmarks
 from pilotage.maps.world_map import NO_LANDMARKS
 
@@ -53,7 +53,7 @@ def odometry_of_bag(path: Path, topics: Sequence[str] = (), truth: str | None = 
     topics
         The odometry (``nav_msgs/Odometry``); by default the usual one, without any the transforms.
     truth
-        The topic of the true poses, or ``/tf:PARENT:CHILD``; by default one of the usual names.
+        As ``true_poses`` has it.
 
     Raises
     ------
@@ -63,9 +63,11 @@ def odometry_of_bag(path: Path, topics: Sequence[str] = (), truth: str | None = 
     if len(topics) > 1:
         raise InputError(f"{path}: expected one topic of odometry, found {len(topics)}")
     claimed = read_odometry(path, topics[0] if topics else None)
-    true = read_poses(path, truth, TRUTH)
+    true = true_poses(path, truth)
     if true.topic == claimed.topic:
-        raise InputError(f"{path}: expected --truth TOPIC beside the odometry {claimed.topic}, found none")
+        raise InputError(
+            f"{path}: expected --truth TOPIC|FILE beside the odometry {claimed.topic}, found none"
+        )
     t_s, apart = [], -np.inf
     for t in claimed.t_s[(claimed.t_s >= true.t_s[0]) & (claimed.t_s <= true.t_s[-1])]:
         if t - apart >= STEP_S - 1e-6:
@@ -133,7 +135,7 @@ def commands_of_bag(
         told[kind] = name
     sent = read_series(path, TWISTS, told.get(TWISTS))
     if truth is not None or len(landmarks.ids) or (ODOMETRY not in told and has(path, TRUTH)):
-        went = read_poses(path, truth, TRUTH)
+        went = true_poses(path, truth)
     else:
         went = read_odometry(path, told.get(ODOMETRY))
     seen = _detections(path, told.get(LANDMARKS), landmarks)
@@ -211,7 +213,7 @@ def reckonings_of_bag(
     """
     if truth is None and not has(path, TRUTH):
         return []
-    true = read_poses(path, truth, TRUTH)
+    true = true_poses(path, truth)
     out = []
     for sensor, told in _heading_series(path, topics):
         if sensor is not HeadingSensor.GYROSCOPE or len(told.t_s) < LEAST_ROWS:

@@ -33,7 +33,6 @@ from pilotage.logs.bag_series import (
     headings,
     landmarks_in_base,
     read_odometry,
-    read_poses,
     read_series,
     topic_of,
 )
@@ -41,7 +40,7 @@ from pilotage.logs.bags import ODOMETRY as WHEELS
 from pilotage.logs.bags import SCANS
 from pilotage.logs.laser_log import LaserLog, interpolate_poses
 from pilotage.logs.laser_recordings import read_laser_log
-from pilotage.logs.trajectories import read_tum
+from pilotage.logs.true_poses import true_poses
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.beacon import BeaconConfig
 from pilotage.sensors.lidar import LidarConfig
@@ -394,13 +393,8 @@ def _last_at(clock: FloatArray, t_s: FloatArray) -> IntArray:
 def _truth(log: Path, truth: str | None, clock: FloatArray, bag: bool) -> FloatArray:
     """(K, 3) true poses; nan where nobody knows."""
     nobody = np.full((len(clock), 3), np.nan)
-    if truth is not None and Path(truth).is_file():
-        path = read_tum(Path(truth))
-        assert path.t_s is not None, "TUM has times"
-        turn = np.arctan2(path.rotations[:, 1, 0], path.rotations[:, 0, 0])
-        t_s, poses = path.t_s, np.column_stack([path.points_xyz_m[:, :2], turn])
-    elif bag and (truth is not None or has(log, TRUTH)):
-        found = read_poses(log, truth, TRUTH)
+    if (truth is not None and Path(truth).is_file()) or (bag and (truth is not None or has(log, TRUTH))):
+        found = true_poses(log, truth)
         t_s, poses = found.t_s, headings(found.values)
     elif truth is not None:
         raise InputError(f"--truth: expected a TUM file or a bag's topic, found neither: '{truth}'")
