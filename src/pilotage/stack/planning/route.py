@@ -27,7 +27,7 @@ from pilotage.stack.planning.driving_space import (
     spaced_waypoints,
 )
 from pilotage.stack.planning.plan_status import PlanStatus
-from pilotage.stack.planning.planner import PLANNERS, Path, PlanRequest, PlanResult
+from pilotage.stack.planning.planner import PLANNERS, ConfiguredPlanner, Path, PlanRequest, PlanResult
 
 MOST_STATES = 5_000_000
 """Of which a route is checked, ``CHECK_SPACING_M`` apart: 50 km. A typing error is no road to the moon."""
@@ -63,7 +63,7 @@ class _DoesNotFitError(Exception):
 
 
 @PLANNERS.add("route", RouteConfig)
-class RoutePlanner:
+class RoutePlanner(ConfiguredPlanner[RouteConfig]):
     """Follows a programmed route; says where it does not keep its clearance instead of avoiding it.
 
     Raises
@@ -74,7 +74,7 @@ class RoutePlanner:
     """
 
     def __init__(self, config: RouteConfig) -> None:
-        self._config = config
+        super().__init__(config)
         self._points = np.array(config.points_m, dtype=np.float64)
         length_m = float(np.hypot(*np.diff(self._points, axis=0).T).sum())
         most_m = MOST_STATES * CHECK_SPACING_M
@@ -87,11 +87,6 @@ class RoutePlanner:
             _rounded(self._points, None, None, config)
         except _DoesNotFitError as error:
             raise InputError(f"route: {error}") from None
-
-    @property
-    def clearance_m(self) -> float:
-        """Distance that it keeps from obstacles where a request names none."""
-        return self._config.clearance_m
 
     def plan(self, request: PlanRequest) -> PlanResult:
         """Round the route's corners from the request's start to its goal and check the clearance."""

@@ -28,7 +28,7 @@ from pilotage.stack.planning.driving_space import (
     usual_radius_m,
 )
 from pilotage.stack.planning.plan_status import PlanStatus
-from pilotage.stack.planning.planner import PLANNERS, Path, PlanRequest, PlanResult
+from pilotage.stack.planning.planner import PLANNERS, ConfiguredPlanner, Path, PlanRequest, PlanResult
 from pilotage.stack.planning.rough_path import Around, look_around
 from pilotage.stack.planning.rrt_star import MAX_TREE_NODES, RrtStarConfig, directly
 from pilotage.stack.planning.rrt_star import search as grown
@@ -63,7 +63,7 @@ class RrtStarDubinsConfig(RrtStarConfig):
 
 
 @PLANNERS.add("rrt-star-dubins", RrtStarDubinsConfig)
-class RrtStarDubinsPlanner:
+class RrtStarDubinsPlanner(ConfiguredPlanner[RrtStarDubinsConfig]):
     """Sampling-based planner for forward driving with a turning radius (see ``kernels.rrt_star``).
 
     Asymptotically optimal with ``stop='optimize'`` (Karaman and Frazzoli 2011). Fails to find paths whose
@@ -74,14 +74,6 @@ class RrtStarDubinsPlanner:
     InputError
         From ``plan`` where the request's clearance or poses are not finite.
     """
-
-    def __init__(self, config: RrtStarDubinsConfig) -> None:
-        self._config = config
-
-    @property
-    def clearance_m(self) -> float:
-        """Distance that it keeps from obstacles where a request names none."""
-        return self._config.clearance_m
 
     def outline_clearance_m(self, outline: Footprint) -> float:
         """What it keeps beside the outline itself where that is driven along the very path."""
