@@ -214,10 +214,9 @@ def _single_leg(
 ) -> list[_Piece]:
     """The shortest Dubins curve where nothing lies between start and goal."""
     (ax, ay), (bx, by) = points
-    if goal_heading is None:
-        word, *lengths = dubins.shortest_to_point(ax, ay, start_heading, bx, by, radius_m)
-    else:
-        word, *lengths = dubins.shortest(ax, ay, start_heading, bx, by, goal_heading, radius_m)
+    heading, free = (0.0, True) if goal_heading is None else (goal_heading, False)
+    *_, word, l0, l1, l2 = dubins.connect(ax, ay, start_heading, bx, by, heading, free, radius_m)
+    lengths = l0, l1, l2
     pieces = [
         _Piece(int(turn), radius_m, length) for turn, length in zip(dubins.TURNS[word], lengths, strict=True)
     ]
@@ -228,7 +227,7 @@ def _turn_toward(
     point: FloatArray, heading: float, target: FloatArray, radius_m: float
 ) -> tuple[_Piece, FloatArray]:
     """The arc from a pose until it looks at the target, and where that arc ends."""
-    word, arc, straight, _ = dubins.shortest_to_point(
+    *_, word, arc, straight, _ = dubins.shortest_to_point(
         point[0], point[1], heading, target[0], target[1], radius_m
     )
     if word in (dubins.LRL, dubins.RLR) or straight <= 0.0:
@@ -249,5 +248,5 @@ def _states(start: FloatArray, pieces: list[_Piece], spacing_m: float) -> FloatA
         word = dubins.RSR if piece.turn < 0 else dubins.LSL
         lengths = (0.0, piece.length_m, 0.0) if piece.turn == 0 else (piece.length_m, 0.0, 0.0)
         radius_m = piece.radius_m if piece.turn != 0 else 1.0
-        out.append(dubins.sample(x, y, th, radius_m, word, *lengths, spacing_m)[1:])
+        out.append(dubins.sample(dubins.Curve(x, y, th, radius_m, word, *lengths), spacing_m)[1:])
     return np.concatenate(out)
