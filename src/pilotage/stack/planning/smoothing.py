@@ -38,7 +38,7 @@ class NoSmoother:
     """Returns the path as it is: the report leaves smoothing to the local planner."""
 
     def __init__(self, config: NoSmootherConfig) -> None:
-        self._config = config
+        del config
 
     def smooth(self, path: Path, request: PlanRequest, clearance_m: float) -> Path:  # noqa: ARG002
         """Return ``path`` itself."""

@@ -356,11 +356,6 @@ class Tracker:
         """How many there are; a break may drop some of the last ones."""
         return len(self._keyframes)
 
-    @property
-    def lost(self) -> int:
-        """How many scans could not be aligned."""
-        return self._matcher.lost
-
     def last_step(self) -> LocalTrack:
         """Return the last two keyframes alone, without their points."""
         pair = self._keyframes[-2:]
