@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from pilotage.core.types import FloatArray
+from pilotage.kernels.arrays import read_only
 from pilotage.kernels.slam.align import TOO_FEW, align
 from pilotage.kernels.slam.branch_bound import NO_SEED, PASS_OVER_NONE, search_window
 from pilotage.kernels.slam.buckets import sort_into_buckets
@@ -23,6 +24,7 @@ HIT_SCORE = 0.3
 LEAST_MEAN, RIVAL_SHARE = 0.25, 0.6
 SAME_PLACE_M, SAME_HEADING_RAD = 0.8, 0.35
 """A second answer nearer than this is the first one."""
+PRIOR = read_only(1e-3 * np.eye(3))
 ALIGN_REACH_M, ALIGN_LAST_REACH_M, ALIGN_SCALE_M = 0.4, 0.15, 0.05
 MOST_ALIGNED_M, MOST_ALIGNED_RAD = 0.25, 0.1
 """An alignment that ends farther from the place that was searched has slid along a corridor."""
@@ -139,7 +141,7 @@ def laid(
     pose, hessian, fit, status = align(
         moving.fine,
         best[:3].copy(),
-        1e-3 * np.eye(3),
+        PRIOR,
         ALIGN_REACH_M,
         ALIGN_LAST_REACH_M,
         ALIGN_SCALE_M,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pilotage.core.types import FloatArray
+from pilotage.kernels.arrays import read_only
 from pilotage.kernels.slam.align import TOO_FEW, align
 from pilotage.kernels.slam.buckets import sort_into_buckets
 from pilotage.kernels.slam.frames import between, composed, gathered
@@ -20,7 +21,7 @@ AROUND = 4
 """Keyframes to either side along the path that lend a scan their points."""
 BUCKET_M, REACH_M = 0.15, 0.5
 MOST_MOVED_M, MOST_MOVED_RAD = 1.0, 0.3
-PRIOR = np.diag([0.1, 0.1, 1.0])
+PRIOR = read_only(np.diag([0.1, 0.1, 1.0]))
 """Holds a scan that is being aligned where nothing else does, in squared residuals."""
 HUNG_COV = np.diag([0.02, 0.02, 0.008]) ** 2
 """Of where a scan hangs between the keyframes, beside what may have slipped between these."""

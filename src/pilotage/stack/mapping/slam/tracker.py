@@ -26,7 +26,7 @@ from pilotage.stack.mapping.slam.guesses import (
     HEALED_SLIP,
     is_far,
 )
-from pilotage.stack.mapping.slam.local_matching import PRIOR, Aside, LocalMatcher
+from pilotage.stack.mapping.slam.local_matching import Aside, LocalMatcher
 from pilotage.stack.mapping.slam.odometry import NO_OTHERS, recording_of
 from pilotage.stack.mapping.slam.odometry_record import OdometryRecord, ToldByOdometry
 from pilotage.stack.mapping.slam.unknown_ground import FEW_POINTS, View
@@ -185,11 +185,7 @@ class Tracker:
                 end,
                 limits,
                 config.local_keyframes,
-                PRIOR,
-                matcher.track,
-                matcher.map_,
-                matcher.views,
-                matcher.found,
+                matcher.tracked,
                 matcher.keyframes,
                 poses,
                 owners,
