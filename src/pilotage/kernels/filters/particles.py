@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pilotage.kernels.arrays import FloatArray, IntArray
-from pilotage.kernels.geometry.motion import exact_arc, mid_angle, sideways, wrap
+from pilotage.kernels.geometry.motion import moved, sideways, wrap
 from pilotage.kernels.geometry.nearest import (
     SEVERAL,
     distances_by_node,
@@ -64,10 +64,7 @@ def sample_motion(
     for i in range(poses.shape[0]):
         d = distance + distance_std * normals[i, 0]
         a = angle + angle_std * normals[i, 1]
-        if exact:
-            poses[i, 0], poses[i, 1], poses[i, 2] = exact_arc(poses[i, 0], poses[i, 1], poses[i, 2], d, a)
-        else:
-            poses[i, 0], poses[i, 1], poses[i, 2] = mid_angle(poses[i, 0], poses[i, 1], poses[i, 2], d, a)
+        poses[i, 0], poses[i, 1], poses[i, 2] = moved(poses[i, 0], poses[i, 1], poses[i, 2], d, a, exact)
 
 
 @kernel
