@@ -8,7 +8,7 @@ import numpy as np
 import scipy
 
 from pilotage.core.errors import InputError
-from pilotage.core.types import BoolArray, FloatArray
+from pilotage.core.types import BoolArray, FloatArray, Pose2
 from pilotage.kernels.filters import particles
 from pilotage.kernels.grids.marks import marked_at
 from pilotage.maps.known_maps import OncePerMap
@@ -128,8 +128,7 @@ class LikelihoodField:
 
     def log_densities(self, points: FloatArray, pose: FloatArray) -> FloatArray:
         """(K,) of each of a scan's end points (K, 2) in the robot's frame, from a pose (3,)."""
-        c, s = math.cos(pose[2]), math.sin(pose[2])
-        away = self._nearest.at(pose[:2] + points @ np.array([[c, s], [-s, c]]))
+        away = self._nearest.at(Pose2.from_array(pose).placed(points))
         entries = np.minimum(away / self._step_m + 0.5, len(self._table) - 1.0)
         return np.asarray(self._table[entries.astype(np.int64)])
 
@@ -155,8 +154,7 @@ class LikelihoodField:
         """
         if self._known is None or not len(points):
             return points
-        c, s = math.cos(pose[2]), math.sin(pose[2])
-        mapped = self.known_at(pose[:2] + points @ np.array([[c, s], [-s, c]]))
+        mapped = self.known_at(Pose2.from_array(pose).placed(points))
         return np.ascontiguousarray(points[mapped & (mapped.mean() >= LEAST_MAPPED)])
 
     def known_at(self, points: FloatArray) -> BoolArray:

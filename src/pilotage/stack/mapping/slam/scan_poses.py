@@ -12,6 +12,7 @@ from pilotage.kernels.slam.frames import between, composed, gathered
 from pilotage.kernels.slam.pairs import LAST_REACH_M, SCALE_M
 from pilotage.kernels.slam.slips import told_by
 from pilotage.logs.laser_log import LaserLog
+from pilotage.models.pose_graph_covariance import turns
 from pilotage.stack.mapping.slam.clouds import Clouds, cloud_of
 from pilotage.stack.mapping.slam.config import SlamConfig
 from pilotage.stack.mapping.slam.tracker import LocalTrack
@@ -73,10 +74,7 @@ def _slipped(track: LocalTrack, poses: FloatArray) -> FloatArray:
     share = np.clip(_shares(track), 0.0, 1.0)
     ahead = np.minimum(track.owner + 1, track.keyframes.size - 1)
     slipped = (share * (1.0 - share))[:, None, None] * track.slips[ahead]
-    turn = np.zeros((share.size, 3, 3))
-    turn[:, 0, 0] = turn[:, 1, 1] = np.cos(poses[:, 2])
-    turn[:, 1, 0] = np.sin(poses[:, 2])
-    turn[:, 0, 1], turn[:, 2, 2] = -turn[:, 1, 0], 1.0
+    turn = turns(poses[:, 2])
     return np.asarray(turn @ slipped @ turn.transpose(0, 2, 1))
 
 
