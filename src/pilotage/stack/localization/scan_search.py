@@ -12,7 +12,7 @@ from pilotage.core.types import FloatArray, Pose2
 from pilotage.kernels.geometry.motion import exact_arc
 from pilotage.kernels.slam.branch_bound import NO_SEED, PASS_OVER_NONE, search_window
 from pilotage.kernels.slam.frames import between
-from pilotage.kernels.slam.match_grid import ScoreArray, max_pyramid
+from pilotage.kernels.slam.match_grid import ScoreArray, scores_of
 from pilotage.stack.localization.likelihood_field import LikelihoodField
 
 CELL_M, MOST_CELLS = 0.1, 2_000_000
@@ -119,7 +119,7 @@ class ScanSearch:
         scores = np.where(away < 2.5 * STD_M, np.exp(-0.5 * (away / STD_M) ** 2), open_score)
         grid: ScoreArray = scores.reshape(rows, columns).astype(np.float32)
         self._grid = grid
-        self._pyramid, self._margin = max_pyramid(grid, LEVELS)
+        self._scores = scores_of(grid, LEVELS, self._corner, self._cell_m)
         self._middle = np.array([0.5 * (xmin + xmax), 0.5 * (ymin + ymax), 0.0])
         self._half_m = 0.5 * max(width, height)
 
@@ -151,11 +151,7 @@ class ScanSearch:
     def _search(self, points: FloatArray, least: float, away: FloatArray) -> tuple[FloatArray, bool]:
         """(4,) of ``search_window``, and whether all was looked at."""
         best, nodes = search_window(
-            self._pyramid,
-            self._margin,
-            float(self._corner[0]),
-            float(self._corner[1]),
-            self._cell_m,
+            self._scores,
             points,
             self._middle,
             self._half_m,

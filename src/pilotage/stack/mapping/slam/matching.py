@@ -13,7 +13,7 @@ from pilotage.kernels.slam.align import TOO_FEW, align
 from pilotage.kernels.slam.branch_bound import NO_SEED, PASS_OVER_NONE, search_window
 from pilotage.kernels.slam.buckets import sort_into_buckets
 from pilotage.kernels.slam.frames import between
-from pilotage.kernels.slam.match_grid import ScoreArray
+from pilotage.kernels.slam.match_grid import Scores
 from pilotage.kernels.slam.slips import CHANCE
 from pilotage.stack.mapping.slam.local_matching import BUCKET_M
 from pilotage.stack.mapping.slam.submaps import Submap, Submaps
@@ -71,9 +71,9 @@ def match(
     submaps: Submaps, earlier: int, later: int, predicted: FloatArray, half_m: float, half_rad: float
 ) -> Match:
     """Search a submap in the window around where the graph has it on an earlier one."""
-    pyramid = submaps.pyramid(earlier)
+    scores = submaps.scores(earlier)
     map_, moving, cell_m = submaps[earlier], submaps[later], submaps.cell_m
-    found, _ = laid(map_, pyramid, moving, cell_m, predicted, half_m, half_rad)
+    found, _ = laid(map_, scores, moving, predicted, half_m, half_rad)
     if found.score <= 0.0:
         return found
     agreement, overlap = lying(moving, cell_m, map_.fine, between(found.relative, np.zeros(3)))
@@ -85,9 +85,8 @@ def match(
 
 def laid(
     map_: Submap,
-    pyramid: tuple[ScoreArray, int],
+    scores: Scores,
     moving: Submap,
-    cell_m: float,
     predicted: FloatArray,
     half_m: float,
     half_rad: float,
@@ -114,23 +113,10 @@ def laid(
     turns = int(np.ceil(half_rad / STEP_RAD))
     points = np.ascontiguousarray(moving.coarse[:, :2])
     angles: FloatArray = STEP_RAD * np.arange(-turns, turns + 1, dtype=np.float64)
-    corner = map_.corner_xy_m
 
     def search(least: float, away: FloatArray, any_will_do: bool = False) -> tuple[FloatArray, bool]:
         best, nodes = search_window(
-            *pyramid,
-            corner[0],
-            corner[1],
-            cell_m,
-            points,
-            predicted,
-            half_m,
-            angles,
-            least,
-            away,
-            budget,
-            NO_SEED,
-            any_will_do,
+            scores, points, predicted, half_m, angles, least, away, budget, NO_SEED, any_will_do
         )
         return np.asarray(best), nodes > budget
 
@@ -151,7 +137,7 @@ def laid(
         reference,
     )
     pose[2] = (pose[2] + np.pi) % (2.0 * np.pi) - np.pi
-    agreement, overlap = lying(map_, cell_m, moving.fine, pose)
+    agreement, overlap = lying(map_, scores.cell_m, moving.fine, pose)
     slid = between(best[:3], pose)
     held = float(np.hypot(slid[0], slid[1])) < MOST_ALIGNED_M and abs(float(slid[2])) < MOST_ALIGNED_RAD
     aligned = status != TOO_FEW and held
