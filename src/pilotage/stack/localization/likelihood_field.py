@@ -112,19 +112,9 @@ class LikelihoodField:
 
     def log_likelihoods(self, points: FloatArray, poses: FloatArray) -> FloatArray:
         """(N,) of a scan's end points (K, 2) in the robot's frame, seen from each of the poses (N, 3)."""
-        out, field = np.empty(poses.shape[0]), self._nearest
-        particles.log_likelihoods(
-            poses,
-            points,
-            field.index,
-            *field.origin_xy_m,
-            field.resolution_m,
-            field.items,
-            self._table,
-            self._step_m,
-            out,
-        )
-        return out
+        nodes, table = self._nearest.nodes, self._table
+        found: FloatArray = particles.log_likelihoods(poses, points, nodes, table, self._step_m)
+        return found
 
     def log_densities(self, points: FloatArray, pose: FloatArray) -> FloatArray:
         """(K,) of each of a scan's end points (K, 2) in the robot's frame, from a pose (3,)."""
