@@ -113,10 +113,10 @@ def check_drivable(path: Path, world: SegmentMap, clearance_m: float, radius_m: 
     fine: list[FloatArray] = []
     total_m = 0.0
     for (ax, ay, ath), (bx, by, bth) in itertools.pairwise(path.states):
-        word, l0, l1, l2 = dubins.shortest(ax, ay, ath, bx, by, bth, radius_m)
-        assert l0 + l1 + l2 <= 0.051
-        total_m += l0 + l1 + l2
-        fine.append(dubins.sample(ax, ay, ath, radius_m, word, l0, l1, l2, 0.01))
+        curve = dubins.shortest(ax, ay, ath, bx, by, bth, radius_m)
+        assert dubins.length_of(curve) <= 0.051
+        total_m += dubins.length_of(curve)
+        fine.append(dubins.sample(curve, 0.01))
     points = np.ascontiguousarray(np.concatenate(fine)[:, :2])
     assert distances_to_nearest(points, world.segments_m, world.circles_m).min() >= clearance_m - 1e-6
     assert math.isclose(total_m, path.length_m, abs_tol=1e-5)

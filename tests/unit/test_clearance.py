@@ -84,12 +84,12 @@ def test_checked_curves_are_free_but_for_the_skin(
     a: tuple[float, float, float], b: tuple[float, float, float]
 ) -> None:
     radius = 0.5
-    word, l0, l1, l2 = dubins.shortest(*a, *b, radius)
+    curve = dubins.shortest(*a, *b, radius)
     step = least_step(0.3, radius)
-    states = dubins.sample(*a, radius, word, l0, l1, l2, 0.005)
+    states = dubins.sample(curve, 0.005)
     true = distances_to_nearest(np.ascontiguousarray(states[:, :2]), CROWD.segments_m, CROWD.circles_m)
     inside = ((states[:, :2] >= 0.0) & (states[:, :2] <= 16.0)).all()
-    if curve_is_free(*a, radius, word, l0, l1, l2, CROWD_SPACE, 0.3, step):
+    if curve_is_free(curve, CROWD_SPACE, 0.3, step):
         assert true.min() >= 0.3 - skin(step, 0.3, radius) - 1e-9
     elif inside:
         assert true.min() < 0.3 + 0.0051

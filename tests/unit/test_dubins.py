@@ -19,11 +19,11 @@ pose = st.tuples(coordinate, coordinate, angle)
 
 
 def length(a: Pose, b: Pose, r: float) -> float:
-    return float(sum(dubins.shortest(*a, *b, r)[1:]))
+    return dubins.length_of(dubins.shortest(*a, *b, r))
 
 
-def end(a: Pose, r: float, word: int, l0: float, l1: float, l2: float) -> Pose:
-    return dubins.pose_at(*a, r, word, l0, l1, l2, l0 + l1 + l2)
+def end(curve: dubins.Curve) -> Pose:
+    return dubins.pose_at(curve, dubins.length_of(curve))
 
 
 def off(a: Pose, b: Pose) -> float:
@@ -33,15 +33,15 @@ def off(a: Pose, b: Pose) -> float:
 
 @given(pose, pose, radius)
 def test_ends_meet_for_every_word_and_the_shortest_is_the_shortest(a: Pose, b: Pose, r: float) -> None:
-    word, l0, l1, l2 = dubins.shortest(*a, *b, r)
-    best = l0 + l1 + l2
-    assert off(end(a, r, word, l0, l1, l2), b) < 1e-6
+    curve = dubins.shortest(*a, *b, r)
+    best = dubins.length_of(curve)
+    assert off(end(curve), b) < 1e-6
     assert best >= math.hypot(b[0] - a[0], b[1] - a[1]) - 1e-6
     for other in range(6):
         pieces = dubins.word_lengths(*a, *b, r, other)
         if math.isfinite(pieces[0]):
             assert min(pieces) >= 0.0
-            assert off(end(a, r, other, *pieces), b) < 1e-6
+            assert off(end(dubins.Curve(*a, r, other, *pieces)), b) < 1e-6
             assert best <= sum(pieces)
 
 
@@ -59,22 +59,21 @@ def test_mirrored_reversed_scaled_and_moved_problems_have_the_same_length(a: Pos
 
 @given(pose, pose, radius, st.floats(0.01, 0.3))
 def test_samples_are_spaced_and_bend_no_more_than_allowed(a: Pose, b: Pose, r: float, spacing: float) -> None:
-    word, l0, l1, l2 = dubins.shortest(*a, *b, r)
-    states = dubins.sample(*a, r, word, l0, l1, l2, spacing)
+    curve = dubins.shortest(*a, *b, r)
+    states = dubins.sample(curve, spacing)
     steps = np.hypot(*np.diff(states[:, :2], axis=0).T)
     assert steps.max() <= spacing + 1e-9
     assert off(tuple(states[0]), a) < 1e-12
     assert off(tuple(states[-1]), b) < 1e-6
     turned = np.abs(np.angle(np.exp(1j * np.diff(states[:, 2]))))
-    step_m = (l0 + l1 + l2) / (len(states) - 1)
+    step_m = dubins.length_of(curve) / (len(states) - 1)
     assert (turned <= step_m / r + 1e-7).all()
 
 
 @given(pose, coordinate, coordinate, radius)
 def test_free_heading_is_the_least_over_all_headings(a: Pose, x: float, y: float, r: float) -> None:
-    word, l0, l1, l2 = dubins.shortest_to_point(*a, x, y, r)
-    relaxed = l0 + l1 + l2
-    reached = end(a, r, word, l0, l1, l2)
+    curve = dubins.shortest_to_point(*a, x, y, r)
+    relaxed, reached = dubins.length_of(curve), end(curve)
     assert math.hypot(reached[0] - x, reached[1] - y) < 1e-6
     scan = [length(a, (x, y, h), r) for h in np.linspace(-math.pi, math.pi, 361)]
     assert relaxed <= min(scan) + 1e-6
@@ -105,8 +104,8 @@ def test_known_lengths() -> None:
     assert length((0, 0, 0), (0, 2, math.pi), 1.0) == pytest.approx(math.pi)
     assert length((0, 0, 0), (0, 4, math.pi), 1.0) == pytest.approx(math.pi + 2.0)
     # Turning round on the spot takes three arcs: 60, 300 and 60 degrees.
-    word, *pieces = dubins.shortest(0, 0, 0, 0, 0, math.pi, 1.0)
+    *_, word, l0, l1, l2 = dubins.shortest(0, 0, 0, 0, 0, math.pi, 1.0)
     assert dubins.WORD_NAMES[word] in ("LRL", "RLR")
-    assert np.array(pieces) == pytest.approx(np.radians([60.0, 300.0, 60.0]))
+    assert np.array([l0, l1, l2]) == pytest.approx(np.radians([60.0, 300.0, 60.0]))
     # A point on the turning circle's far side.
-    assert sum(dubins.shortest_to_point(0, 0, 0, 0, 2, 1.0)[1:]) == pytest.approx(math.pi)
+    assert dubins.length_of(dubins.shortest_to_point(0, 0, 0, 0, 2, 1.0)) == pytest.approx(math.pi)

@@ -21,7 +21,7 @@ from pilotage.kernels.geometry.motion import exact_arc
 from pilotage.kernels.scans.rays import fan_ranges
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.maps.world_map import WorldMap
-from pilotage.models.footprint import NO_CORNERS, Footprint
+from pilotage.models.footprint import Footprint
 from pilotage.models.motion.differential_drive import DifferentialDriveConfig
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, Readings
@@ -204,7 +204,8 @@ def test_driving_past_is_no_driving_away() -> None:
     def closes(bearing_rad: float, gap_m: float = 0.05) -> bool:
         away = 0.3 + 0.25 + gap_m
         discs = np.array([[[away * math.cos(bearing_rad), away * math.sin(bearing_rad), 0.25]]] * 4)
-        return bool(drive_closes_in(0.0, 0.0, 0.0, 0.5, 0.0, 0.1, 2.0, 0.05, NO_CORNERS, 0.3, discs, 0.1))
+        disc = Footprint.disc(0.3).outline
+        return bool(drive_closes_in((0.0, 0.0, 0.0), 0.5, 0.0, 0.1, 2.0, 0.05, disc, discs, 0.1))
 
     assert closes(0.0)
     assert closes(0.5 * math.pi)
@@ -232,7 +233,7 @@ def test_corners_slide_along_somebody_and_turn_away_from_him(
 ) -> None:
     corners = np.array([[0.25, 0.16], [-0.25, 0.16], [-0.25, -0.16], [0.25, -0.16]])
     discs = np.array([[[*at, 0.25]]] * 4)
-    found = drive_closes_in(0.0, 0.0, 0.0, *command, 0.2, 2.0, 0.05, corners, 0.297, discs, 0.1)
+    found = drive_closes_in((0.0, 0.0, 0.0), *command, 0.2, 2.0, 0.05, (corners, 0.297, 0.16), discs, 0.1)
     assert found == closes
 
 

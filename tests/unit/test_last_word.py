@@ -390,6 +390,7 @@ def test_corners_between_beams_are_not_driven_into(
     sides = np.column_stack([box.T, np.roll(box, -1, axis=1).T])
     touches = touches_an_end(
         scan_of(sheet, *sides.tolist()).ranges_m, LaserView("laser", sheet).directions, (0.0, 0.0), 3.0,
-        (0.0, 0.0, 0.0), (1.2, 0.0, 0.0), 120, RECTANGLE, 0.34, 0.01, sheet.beam_step_rad, 0.05, 0.0,
+        (0.0, 0.0, 0.0), (1.2, 0.0, 0.0), 120, (RECTANGLE, 0.34, 0.2),
+        (0.01, sheet.beam_step_rad, 0.05, 0.0),
     )  # fmt: skip
     assert touches

@@ -30,8 +30,8 @@ GAP_M = 0.1
 
 def clear(points: list[tuple[float, float]], corners: FloatArray = CORNERS) -> float:
     """How far straight ahead is clear."""
-    radius_m = RADIUS_M if len(corners) else 0.3
-    return 0.01 * (poses_in_own_half(AHEAD, corners, radius_m, np.array(points), GAP_M) - 1)
+    outline = (corners, RADIUS_M if len(corners) else 0.3, 0.2)
+    return 0.01 * (poses_in_own_half(AHEAD, outline, np.array(points), GAP_M) - 1)
 
 
 def test_it_goes_half_of_what_is_left_between_both_but_for_the_gap() -> None:
@@ -47,8 +47,8 @@ def test_along_and_away_it_goes_as_it_likes() -> None:
 def test_corners_that_a_turn_swings_out_count_and_a_disc_has_none() -> None:
     turn = np.column_stack([np.zeros((60, 2)), np.linspace(0.0, 0.6, 60)])
     beside = np.array([[0.7, 0.45]])
-    assert poses_in_own_half(turn, CORNERS, RADIUS_M, beside, GAP_M) < 10
-    assert poses_in_own_half(turn, NO_CORNERS, 0.3, beside, GAP_M) == 60
+    assert poses_in_own_half(turn, (CORNERS, RADIUS_M, 0.2), beside, GAP_M) < 10
+    assert poses_in_own_half(turn, (NO_CORNERS, 0.3, 0.3), beside, GAP_M) == 60
 
 
 @settings(max_examples=80, deadline=None)
@@ -96,7 +96,7 @@ def test_two_that_both_keep_to_their_halves_never_touch(
     seen_by_other = (mine - there[:2]) @ np.array([[c, -s], [s, c]])
     ends = []
     for at, path, seen in ((here, arc(bend), other), (there, arc(other_bend), seen_by_other)):
-        count = poses_in_own_half(path, CORNERS, RADIUS_M, np.ascontiguousarray(seen), GAP_M)
+        count = poses_in_own_half(path, (CORNERS, RADIUS_M, 0.2), np.ascontiguousarray(seen), GAP_M)
         ends.append(outline(placed(path[count - 1], at)))
     # Outlines are seen at points some centimetres apart.
     assert np.hypot(*(ends[0][:, None] - ends[1][None]).transpose(2, 0, 1)).min() > 0.5 * GAP_M

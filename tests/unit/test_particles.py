@@ -78,8 +78,8 @@ def test_a_narrow_cloud_is_weighed_as_each_of_its_particles_alone(seed: int, wid
         np.column_stack([rng.normal(at, width, 60), rng.normal(2.0, width, 60), rng.normal(3.1, width, 60)])
     )
     points, table = rng.uniform(-6.0, 6.0, (20, 2)), -np.arange(50.0)
-    together, alone_, grid = np.empty(60), np.empty(60), (*field.origin_xy_m, field.resolution_m)
-    particles.log_likelihoods(poses, points, field.index, *grid, field.items, table, 0.02, together)
+    alone_ = np.empty(60)
+    together = particles.log_likelihoods(poses, points, field.nodes, table, 0.02)
     for k in range(60):
         c, s = math.cos(poses[k, 2]), math.sin(poses[k, 2])
         away = field.at(poses[k, :2] + points @ np.array([[c, s], [-s, c]]))

@@ -41,10 +41,9 @@ def test_nodes_along_a_curve_deny_only_what_its_check_denies_and_most_of_that() 
         space = space_of(rng)
         for _ in range(200):
             a, b = rng.uniform([0.5, 0.5, -math.pi], [9.5, 9.5, math.pi], (2, 3))
-            word, l0, l1, l2 = dubins.shortest(a[0], a[1], a[2], b[0], b[1], b[2], RADIUS_M)
-            rest = l0, l1, space, CLEARANCE_M, step_m
-            blocked = middle_is_blocked(a[0], a[1], a[2], RADIUS_M, word, *rest)
-            free = curve_is_free(a[0], a[1], a[2], RADIUS_M, word, l0, l1, l2, space, CLEARANCE_M, step_m)
+            curve = dubins.shortest(a[0], a[1], a[2], b[0], b[1], b[2], RADIUS_M)
+            blocked = middle_is_blocked(curve, space, CLEARANCE_M, step_m)
+            free = curve_is_free(curve, space, CLEARANCE_M, step_m)
             assert not (blocked and free)
             told, denied = told + blocked, denied + (not free)
     assert denied > 1000
@@ -60,8 +59,8 @@ def test_curves_that_come_as_near_as_their_check_allows_are_not_denied() -> None
             segments = np.array([[0.0, y + near_m, 10.0, y + near_m]])
             field = sample_distance(0.0, 0.0, NODES_M, 101, 101, segments, np.zeros((0, 3)))
             space = make_space(field, 0.0, 0.0, NODES_M, segments, np.zeros((0, 3)), CLEARANCE_M)
-            word, l0, l1, _ = dubins.shortest(1.0, y, 0.0, 9.0, y, 0.0, RADIUS_M)
-            assert not middle_is_blocked(1.0, y, 0.0, RADIUS_M, word, l0, l1, space, CLEARANCE_M, step_m)
+            curve = dubins.shortest(1.0, y, 0.0, 9.0, y, 0.0, RADIUS_M)
+            assert not middle_is_blocked(curve, space, CLEARANCE_M, step_m)
 
 
 @pytest.mark.parametrize("count", [1, 40, 200])

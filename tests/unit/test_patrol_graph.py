@@ -286,11 +286,11 @@ def test_straight_on_through_the_middle_of_a_door_leads_nearer(angle_rad: float)
     turned = SegmentMap(walls, np.zeros((0, 3)), (-3.0, 0.0, 10.0, 11.0))
     world, places = WorldMap("turned", turned.bounds_m, turned), np.array([[2.0, 2.5], [8.0, 2.5]])
     roadmap = Roadmap(world, places @ turn, np.zeros((0, 2)), 0.38, 1.0, 0.15, 0.5, 0.35)
-    grid = roadmap.time_s(1), *roadmap.origin_xy_m, roadmap.spacing_m, 2.0
+    field = roadmap.placed(roadmap.time_s(1))
     middle = np.column_stack([np.linspace(3.8, 6.2, 241), np.full(241, 2.505)]) @ turn
     for x, y in middle.tolist():
         on_x, on_y = x + 0.05 * along[0], y + 0.05 * along[1]
-        assert eikonal.value_at(on_x, on_y, *grid) < eikonal.value_at(x, y, *grid)
+        assert eikonal.value_at(on_x, on_y, field, 2.0) < eikonal.value_at(x, y, field, 2.0)
 
 
 def test_where_there_is_room_nodes_are_as_far_apart_as_asked_for() -> None:

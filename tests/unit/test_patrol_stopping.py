@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from pilotage.core.types import FloatArray
 from pilotage.kernels.control import disc_returns, eikonal, safe_stop, voronoi_window
+from pilotage.kernels.geometry.field import Field
 from pilotage.kernels.geometry.motion import exact_arc, wrap
 from pilotage.stack.navigator.patrol.gate import NO_GATE
 
@@ -245,7 +246,7 @@ class TestTheBestArc:
         time, beyond = np.hypot(x - 3.0, y), np.hypot(x - 3.0, y - 2.0)
         known = np.hypot(x - pose[0], y - pose[1] - rng.uniform(0.5, 2.0)), -5.0, -5.0, 0.1
         there = (*(pose[:2] + rng.uniform(-0.8, 0.8, 2)).tolist(), 0.5)
-        gate = (beyond, -5.0, -5.0, 0.1, *there, 2.0) if seed % 4 else NO_GATE
+        gate = ((beyond, -5.0, -5.0, 0.1), *there, 2.0) if seed % 4 else NO_GATE
         seen, field = (near, strange, people), (time, -5.0, -5.0, 0.1)
         told = v0, w0, pose, self.LIMITS, self.SAFETY, seen
         costs = {
@@ -268,21 +269,21 @@ class TestTheBestArc:
         w: float,
         pose: FloatArray,
         near: FloatArray,
-        field: safe_stop.Field,
+        field: Field,
         gate: voronoi_window.Gate,
         lane_m: float,
     ) -> float:
         """Of one arc, without leaving anything out."""
         horizon_s, heading_cost, near_cost, soft_m, *_ = self.WINDOW
         cost = self._at(v, w, horizon_s, pose, field, heading_cost, lane_m)
-        if gate[6] > 0.0:
-            cost += gate[7]
+        if gate[3] > 0.0:
+            cost += gate[4]
             came = False
             for t in (0.25 * horizon_s * np.arange(1, 5)).tolist():
                 x, y, _ = exact_arc(pose[0], pose[1], pose[2], v * t, w * t)
-                came = came or math.hypot(x - gate[4], y - gate[5]) <= gate[6]
+                came = came or math.hypot(x - gate[1], y - gate[2]) <= gate[3]
                 if came:
-                    left = self._at(v, w, t, pose, gate[:4], heading_cost, lane_m)
+                    left = self._at(v, w, t, pose, gate[0], heading_cost, lane_m)
                     cost = min(cost, left + t - horizon_s)
         x, y, _ = exact_arc(0.0, 0.0, 0.0, v * horizon_s, w * horizon_s)
         least = min(np.hypot(near[:, 0] - x, near[:, 1] - y).min(initial=np.inf), soft_m + 0.3)
@@ -294,14 +295,14 @@ class TestTheBestArc:
         w: float,
         t: float,
         pose: FloatArray,
-        field: safe_stop.Field,
+        field: Field,
         heading_cost: float,
         lane_m: float,
     ) -> float:
         x, y, theta = exact_arc(pose[0], pose[1], pose[2], v * t, w * t)
         x, y = x - lane_m * math.sin(theta), y + lane_m * math.cos(theta)
-        dx, dy = eikonal.descent(x, y, *field)
-        return eikonal.value_at(x, y, *field, 2.0) + heading_cost * abs(wrap(math.atan2(dy, dx) - theta))
+        dx, dy = eikonal.descent(x, y, field)
+        return eikonal.value_at(x, y, field, 2.0) + heading_cost * abs(wrap(math.atan2(dy, dx) - theta))
 
 
 class TestDrivingThrough:
@@ -319,7 +320,7 @@ class TestDrivingThrough:
         end = 2.0 * np.array([math.cos(bearing), math.sin(bearing)])
         to_place, to_end = np.hypot(x, y), np.hypot(x - end[0], y - end[1])
         grid, known = (-5.0, -5.0, 0.1), (NO_MAP, 0.0, 0.0, 0.1)
-        gate = (to_end, *grid, 0.0, 0.0, 0.5, 2.0 + 0.3 * abs(bearing)) if knows else NO_GATE
+        gate = ((to_end, *grid), 0.0, 0.0, 0.5, 2.0 + 0.3 * abs(bearing)) if knows else NO_GATE
         pose, v, w, came = np.array([-1.5, 0.0, 0.0]), 1.0, 0.0, False
         for k in range(200):
             came = came or math.hypot(*pose[:2]) <= 0.5

@@ -267,11 +267,11 @@ class TestPassages:
         context = build(mission_of(values, seed=0)).team[0].stack._context  # type: ignore[attr-defined]
         context.came_from, context.hop, place = 0, 1, context.roadmap.places_xy_m[1]
         context.pose = Pose2(float(place[0]) - 1.0, float(place[1]), 0.0)
-        assert context.motion.gate(place, 0, 2, NOBODY)[6] > 0.0
-        assert context.motion.gate(place, 0, 0, NOBODY)[6] < 0.0
-        assert context.motion.gate(place, 0, -1, NOBODY)[6] < 0.0
+        assert context.motion.gate(place, 0, 2, NOBODY)[3] > 0.0
+        assert context.motion.gate(place, 0, 0, NOBODY)[3] < 0.0
+        assert context.motion.gate(place, 0, -1, NOBODY)[3] < 0.0
         context.pose = Pose2(float(place[0]) - 3.0, float(place[1]), 0.0)
-        assert context.motion.gate(place, 0, 2, NOBODY)[6] < 0.0  # far yet
+        assert context.motion.gate(place, 0, 2, NOBODY)[3] < 0.0  # far yet
 
     def test_steps_finer_than_the_odometry_change_nothing(self) -> None:
         """Its readings tell of the time since the last one; taken for a step's they doubled the speed."""

@@ -11,6 +11,7 @@ from pilotage.experiments.mission import load_mission
 from pilotage.experiments.run import run_mission
 from pilotage.experiments.studies.study import load_study
 from pilotage.kernels.rrt.clearance import curve_is_free
+from pilotage.kernels.rrt.dubins import Curve
 from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.stack.planning.driving_space import space_for
@@ -34,9 +35,9 @@ def test_an_edge_is_checked_at_the_spacing_asked_for(spacing_m: float) -> None:
             walls = np.array([[at, 1.0, at + longer * spacing_m, 1.0]])
             floor = SegmentMap(walls, np.zeros((0, 3)), (0.0, 0.0, 5.0, 2.0))
             space = space_for(DistanceField.from_map(floor), 0.05)
-            straight = (1.0, 1.049, 0.0, 0.5, 0, 0.0, 3.0, 0.0)
-            assert not curve_is_free(*straight, space, 0.05, 0.01)
-            seen[longer] += not curve_is_free(*straight, space, 0.05, spacing_m)
+            straight = Curve(1.0, 1.049, 0.0, 0.5, 0, 0.0, 3.0, 0.0)
+            assert not curve_is_free(straight, space, 0.05, 0.01)
+            seen[longer] += not curve_is_free(straight, space, 0.05, spacing_m)
     assert seen[1.1] == 21
     assert seen[0.5] < 21
 

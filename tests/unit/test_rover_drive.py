@@ -52,7 +52,7 @@ def moved(
 ) -> tuple[StackStatus, float, Pose2]:
     """Drive to a pose: how it ended, when and where."""
     sim = rover(start, sample_s=sample_s)
-    truth = Truth(OPEN, np.zeros((0, 4)), np.zeros((0, 3)), start, sample_s, sim.body)
+    truth = Truth(OPEN, np.zeros((0, 4)), np.zeros((0, 3)), start, sim.body)
     known = RobotKnowledge(Footprint.disc(1.5), ROVER, {}, sample_s, RandomStreams(0))
     task = TaskKnowledge(Belief(start, 1e-8 * np.eye(3)), (Goal(goal.x_m, goal.y_m, goal.theta_rad),), 1e-3)
     parts = Parts(TrueLocalizer(truth), None, None, None, None, None, None, None)

@@ -110,8 +110,9 @@ def check_costs(tree: rrt_tree.Tree) -> int:
         alive += 1
         edge = float(tree.lengths[node].sum())
         assert tree.cost[node] == pytest.approx(tree.cost[parent] + edge, abs=1e-9)
-        (px, py, pth), (l0, l1, l2) = tree.pose[parent], tree.lengths[node]
-        x, y, th = dubins.pose_at(px, py, pth, 0.5, int(tree.word[node]), l0, l1, l2, edge)
+        begin, word = tree.pose[parent], int(tree.word[node])
+        curve = dubins.Curve(begin[0], begin[1], begin[2], 0.5, word, *tree.lengths[node])
+        x, y, th = dubins.pose_at(curve, edge)
         assert (x, y) == pytest.approx(tuple(tree.pose[node, :2]), abs=1e-6)
         if node != rrt_tree.GOAL:
             assert math.sin(0.5 * (th - tree.pose[node, 2])) == pytest.approx(0.0, abs=1e-6)

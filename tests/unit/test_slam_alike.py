@@ -10,7 +10,7 @@ import pytest
 
 from pilotage.core.types import FloatArray
 from pilotage.kernels.slam.frames import between
-from pilotage.kernels.slam.match_grid import max_pyramid
+from pilotage.kernels.slam.match_grid import scores_of
 from pilotage.stack.mapping.slam.closures import Verdict, judged_alone
 from pilotage.stack.mapping.slam.clouds import Clouds, cloud_of_beams
 from pilotage.stack.mapping.slam.config import SlamConfig
@@ -101,9 +101,9 @@ def test_an_alignment_that_slides_along_a_corridor_is_no_match() -> None:
     angles = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 361)
     cloud = cloud_of_beams(ranges(walls, np.zeros(3), angles), angles, float(angles[1] - angles[0]), 20.0)
     submap = drawn(Clouds.of([cloud]), np.zeros((1, 3)), np.array([0]), np.zeros(3), 0.1)
-    pyramid = max_pyramid(submap.grid, LEVELS)
-    right, _ = laid(submap, pyramid, submap, 0.1, np.zeros(3), 0.1, 0.02)
+    scores = scores_of(submap.grid, LEVELS, submap.corner_xy_m, 0.1)
+    right, _ = laid(submap, scores, submap, np.zeros(3), 0.1, 0.02)
     assert right.aligned
-    slid, _ = laid(submap, pyramid, submap, 0.1, np.array([0.4, 0.0, 0.0]), 0.1, 0.02)
+    slid, _ = laid(submap, scores, submap, np.array([0.4, 0.0, 0.0]), 0.1, 0.02)
     assert slid.score > 0.3
     assert not slid.aligned

@@ -15,7 +15,7 @@ from pilotage.core.types import FloatArray
 from pilotage.experiments.slam_folder import write_slam_folder
 from pilotage.kernels.slam.branch_bound import search_window
 from pilotage.kernels.slam.frames import between, composed
-from pilotage.kernels.slam.match_grid import max_pyramid
+from pilotage.kernels.slam.match_grid import scores_of
 from pilotage.logs.trajectories import read_tum
 from pilotage.models.pose_graph_covariance import covariances
 from pilotage.stack.mapping.slam import matching
@@ -247,17 +247,18 @@ def test_rivals_are_looked_for_where_they_count_alone(
     searched: list[float] = []
 
     def counted(*asked: Any) -> tuple[FloatArray, int]:
-        searched.append(asked[9])
+        searched.append(asked[5])
         return search_window(*asked)
 
     monkeypatch.setattr(matching, "search_window", counted)
-    pyramid, window = max_pyramid(whole.grid, LEVELS), (cell_m, earlier.poses[0], 2.0, 0.3)
-    plain, _ = laid(whole, pyramid, moving, *window)
+    scores = scores_of(whole.grid, LEVELS, whole.corner_xy_m, cell_m)
+    asked_at = earlier.poses[0], 2.0, 0.3
+    plain, _ = laid(whole, scores, moving, *asked_at)
     assert len(searched) > 1
     for budget, worth, searches in ((10**6, False, 1), (10**6, True, len(searched)), (10, True, 1)):
         searched.clear()
-        asked = 0.25, 0.6, budget, lambda found, worth=worth: worth and found.score > 0.0
-        found, everywhere = laid(whole, pyramid, moving, *window, *asked)
+        asked = *asked_at, 0.25, 0.6, budget, lambda found, worth=worth: worth and found.score > 0.0
+        found, everywhere = laid(whole, scores, moving, *asked)
         assert len(searched) == searches
         assert everywhere == (budget > 10)
         if everywhere:

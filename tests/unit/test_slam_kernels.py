@@ -12,8 +12,8 @@ from pilotage.kernels.slam.align import CAPPED, CONVERGED, TOO_FEW, align, norma
 from pilotage.kernels.slam.branch_bound import NO_SEED, PASS_OVER_NONE, search_window
 from pilotage.kernels.slam.buckets import BEYOND_M, nearest, sort_into_buckets
 from pilotage.kernels.slam.frames import between, carried, composed
-from pilotage.kernels.slam.match_grid import max_pyramid, score_grid
-from pilotage.kernels.slam.occupancy import add_scan
+from pilotage.kernels.slam.match_grid import score_grid, scores_of
+from pilotage.kernels.slam.occupancy import HIT_ODDS, MISS_ODDS, MOST_ODDS, add_scan
 from pilotage.kernels.slam.scan_lines import scan_lines, scan_points
 from support.laser_rooms import BEAMS, SPAN_RAD, furnished, ranges
 
@@ -157,13 +157,9 @@ def test_branch_and_bound_finds_what_looking_everywhere_finds(seed: int) -> None
     grid = grid.astype(np.float32)
     points = rng.uniform(-0.8, 0.8, (25, 2))
     centre, angles = np.array([2.0, 2.0, 0.3]), np.array([-0.2, 0.0, 0.2])
-    pyramid, margin = max_pyramid(grid, 3)
+    scores = scores_of(grid, 3, np.zeros(2), 0.1)
     best, _ = search_window(
-        pyramid,
-        margin,
-        0.0,
-        0.0,
-        0.1,
+        scores,
         points,
         centre,
         0.7,
@@ -174,13 +170,8 @@ def test_branch_and_bound_finds_what_looking_everywhere_finds(seed: int) -> None
         NO_SEED,
         False,
     )
-    flat, no_margin = max_pyramid(grid, 0)
     everywhere, _ = search_window(
-        flat,
-        no_margin,
-        0.0,
-        0.0,
-        0.1,
+        scores_of(grid, 0, np.zeros(2), 0.1),
         points,
         centre,
         0.7,
@@ -194,11 +185,7 @@ def test_branch_and_bound_finds_what_looking_everywhere_finds(seed: int) -> None
     assert best[3] == pytest.approx(everywhere[3], abs=1e-6)
     for seed_pose in (best[:3], centre + np.array([0.5, -0.4, 0.1]), centre + 3.0):
         seeded, _ = search_window(
-            pyramid,
-            margin,
-            0.0,
-            0.0,
-            0.1,
+            scores,
             points,
             centre,
             0.7,
@@ -222,10 +209,10 @@ def test_scores_are_those_of_the_cells_that_the_points_fall_into(
     grid = rng.random((40, 50)).astype(np.float32)
     points = rng.uniform(-0.8, 0.8, (26, 2))
     bordered = np.pad(grid, 40)  # nothing was seen out there
-    scores = max_pyramid(grid, levels)
+    scores = scores_of(grid, levels, np.zeros(2), 0.1)
     for shift in np.ndindex(15, 15):
         at = centre_m + 0.1 * (np.array(shift) - 7)
-        window = (*scores, 0.0, 0.0, 0.1, points, np.array([*at, 0.0]), 0.0, np.zeros(1))
+        window = (scores, points, np.array([*at, 0.0]), 0.0, np.zeros(1))
         best, _ = search_window(*window, 0.0, PASS_OVER_NONE, 10**6, NO_SEED, False)
         column, row = np.floor((points + at) / 0.1).astype(int).T
         assert best[3] == pytest.approx(bordered[row + 40, column + 40].mean(dtype=float), abs=1e-9)
@@ -234,9 +221,9 @@ def test_scores_are_those_of_the_cells_that_the_points_fall_into(
 def test_the_second_best_is_elsewhere() -> None:
     grid = np.zeros((30, 60), np.float32)
     grid[15, 10], grid[15, 40] = 1.0, 0.9
-    pyramid, margin = max_pyramid(grid, 3)
+    scores = scores_of(grid, 3, np.zeros(2), 0.1)
     point, centre = np.zeros((1, 2)), np.array([2.5, 1.5, 0.0])
-    window = (pyramid, margin, 0.0, 0.0, 0.1, point, centre, 2.0, np.zeros(1))
+    window = (scores, point, centre, 2.0, np.zeros(1))
     best, _ = search_window(*window, 0.1, PASS_OVER_NONE, 10**6, NO_SEED, False)
     other, _ = search_window(*window, 0.1, np.array([*best[:3], 0.8, 0.3, 0.0, 0.0]), 10**6, NO_SEED, False)
     assert best[3] == pytest.approx(1.0)
@@ -281,25 +268,24 @@ def test_between_undoes_composed(values: list[float]) -> None:
 
 def test_a_beam_clears_its_way_and_marks_its_end() -> None:
     odds = np.zeros((10, 40), np.int8)
-    beams = np.array([2.0, np.nan, np.inf])
-    add_scan(odds, 0.0, 0.0, 0.1, np.array([0.55, 0.55, 0.0]), beams, 0.0, 1e-9, 3.0, 9, 4, 11, 9)
-    assert odds[5, 25] == 9 - 4
-    assert (odds[5, 6:25] == -8).all()
+    scan = np.array([0.55, 0.55, 0.0]), np.array([2.0, np.nan, np.inf]), 0.0, 1e-9, 3.0
+    add_scan((odds, 0.0, 0.0, 0.1), *scan)
+    assert odds[5, 25] == HIT_ODDS - MISS_ODDS
+    assert (odds[5, 6:25] == -2 * MISS_ODDS).all()
     assert odds[5, 36:].max() <= 0
     assert (odds[:5] == 0).all()
-    add_scan(odds, 0.0, 0.0, 0.1, np.array([0.55, 0.55, 0.0]), beams, 0.0, 1e-9, 3.0, 9, 4, 11, 9)
-    assert (odds[5, 6:25] == -11).all()
+    for _ in range(MOST_ODDS // MISS_ODDS):
+        add_scan((odds, 0.0, 0.0, 0.1), *scan)
+    assert (odds[5, 6:25] == -MOST_ODDS).all()
 
 
 def test_a_beam_that_nothing_came_back_from_ends_at_a_wall() -> None:
     """What lies behind stays unknown, and the wall a wall; a cell that one scan alone marked is cleared."""
     odds = np.zeros((3, 60), np.int8)
-    odds[1, 30], odds[1, 15] = 18, 9
-    add_scan(
-        odds, 0.0, 0.0, 0.1, np.array([0.05, 0.15, 0.0]), np.array([np.inf]), 0.0, 1e-9, 5.0, 9, 4, 40, 9
-    )
-    assert (odds[1, 1:15] == -4).all()
-    assert (odds[1, 15], odds[1, 30]) == (5, 18)
+    odds[1, 30], odds[1, 15] = HIT_ODDS + 1, HIT_ODDS
+    add_scan((odds, 0.0, 0.0, 0.1), np.array([0.05, 0.15, 0.0]), np.array([np.inf]), 0.0, 1e-9, 5.0)
+    assert (odds[1, 1:15] == -MISS_ODDS).all()
+    assert (odds[1, 15], odds[1, 30]) == (HIT_ODDS - MISS_ODDS, HIT_ODDS + 1)
     assert (odds[1, 31:] == 0).all()
 
 

@@ -19,6 +19,7 @@ from pilotage.kernels.slam.local_map import (
     LATER_M,
     MET,
     NOTHING_KNOWN,
+    PRIOR,
     REACH_M,
     LocalMap,
     add_to_map,
@@ -42,7 +43,6 @@ from support.laser_rooms import BEAMS, SPAN_RAD, furnished, ranges
 ANGLES = np.linspace(-0.5 * SPAN_RAD, 0.5 * SPAN_RAD, BEAMS)
 RAYS = np.column_stack([np.cos(ANGLES), np.sin(ANGLES)])
 HERE = np.array([2.0, 3.5, 0.2])
-PRIOR = np.diag([2.0, 2.0, 20.0])
 
 
 def cloud(pose: FloatArray, noise: FloatArray | float = 0.0) -> FloatArray:
@@ -161,11 +161,11 @@ def test_maps_repeat_and_far_places_are_told_apart() -> None:
     map_ = map_of(cloud(HERE))
     add_to_map(map_, cloud(HERE), far + HERE, 15, True)
     pose, _, fit, _ = align_in_map(
-        map_, cloud(HERE), far + HERE + np.array([0.05, 0.02, 0.01]), PRIOR, 0.3, 0.2, 0.05, 25, NOTHING_KNOWN
+        map_, cloud(HERE), far + HERE + np.array([0.05, 0.02, 0.01]), 0.3, NOTHING_KNOWN
     )
     assert pose == pytest.approx(far + HERE, abs=4e-3)
     assert fit[1] > 0.8 * BEAMS
-    assert align_in_map(map_, cloud(HERE), HERE, PRIOR, 0.3, 0.2, 0.05, 25, NOTHING_KNOWN)[3] == TOO_FEW
+    assert align_in_map(map_, cloud(HERE), HERE, 0.3, NOTHING_KNOWN)[3] == TOO_FEW
 
 
 @settings(max_examples=20, deadline=None)
@@ -177,14 +177,14 @@ def test_an_alignment_in_the_map_finds_what_one_with_all_points_finds(
     scans = [cloud(HERE, 0.01 * rng.standard_normal(BEAMS)) for _ in range(15)]
     source, start = cloud(HERE, 0.01 * rng.standard_normal(BEAMS)), HERE + np.array([dx, dy, turn])
     map_ = map_of(*scans, led=led)
-    pose, _, _, status = align_in_map(map_, source, start, PRIOR, 0.3, 0.2, 0.05, 25, NOTHING_KNOWN)
+    pose, _, _, status = align_in_map(map_, source, start, 0.3, NOTHING_KNOWN)
     box, starts, _, points = sort_into_buckets(carried(np.concatenate(scans), HERE), 0.2)
     exact = align(source, start, PRIOR, 0.3, 0.2, 0.05, 25, box, starts, points)[0]
     assert status == CONVERGED
     assert np.hypot(*(pose - exact)[:2]) < 0.006
     assert abs(pose[2] - exact[2]) < 0.002
     # What was found already is not found a second time.
-    again = align_in_map(map_, source, start, PRIOR, 0.3, 0.2, 0.05, 25, pose)
+    again = align_in_map(map_, source, start, 0.3, pose)
     assert again[3] in {MET, CONVERGED}
 
 
@@ -196,7 +196,7 @@ def test_the_guess_that_is_right_wins(right: int, dx: float, turn: float) -> Non
     motions = np.insert(wrong, right, motion, axis=0)
     there = composed(HERE, motion)
     pose, hessian, start, told, split = placed(
-        cloud(there), HERE, motions, 3, False, np.zeros((0, 3)), 0.01, 0.9, False, PRIOR, map_of(cloud(HERE))
+        cloud(there), HERE, motions, 3, False, np.zeros((0, 3)), 0.01, 0.9, False, map_of(cloud(HERE))
     )
     assert split
     assert told[0] > 0.6
@@ -209,7 +209,7 @@ def test_the_guess_that_is_right_wins(right: int, dx: float, turn: float) -> Non
 def test_nothing_fits_where_nothing_is() -> None:
     far = np.array([[90.0, 0.0, 0.0]])
     nothing, map_ = np.zeros((0, 3)), map_of(cloud(HERE))
-    told = placed(cloud(HERE), HERE, far, 1, False, nothing, 0.01, 0.9, False, PRIOR, map_)[3]
+    told = placed(cloud(HERE), HERE, far, 1, False, nothing, 0.01, 0.9, False, map_)[3]
     assert told[0] == -1.0
 
 

@@ -18,7 +18,6 @@ from pilotage.stack.mapping.slam.closures import (
     candidates,
     unproven,
 )
-from pilotage.stack.mapping.slam.local_matching import PRIOR
 from pilotage.stack.mapping.slam.matching import Match
 from pilotage.stack.mapping.slam.refinement import BESIDE, not_aligned
 from pilotage.stack.mapping.slam.uncertainty import Edges
@@ -36,7 +35,7 @@ class Slips:
         hessian = np.diag([0.0, 0.0, 1500.0])
         hessian[:2, :2] = normals.T @ normals * POINTS / len(normals)
         pose = np.array([3.0, 1.0, heading])
-        add_slip(self.total, self.held, pose, pose, hessian, POINTS, 0.03, by_odometry, PRIOR)
+        add_slip(self.total, self.held, pose, pose, hessian, POINTS, 0.03, by_odometry)
 
     def covariance(self) -> FloatArray:
         return self.total + self.held @ self.held.T

@@ -55,7 +55,7 @@ class TestTimeToGo:
         eikonal.sweep_down(time, slowness, 0.1)
         around = math.hypot(1.5, 3.1) + math.hypot(1.5, 3.1)
         assert time[5, 5] == pytest.approx(around, rel=0.06)
-        _, dy = eikonal.descent(1.5, 1.5, time, 0.0, 0.0, 0.1)
+        _, dy = eikonal.descent(1.5, 1.5, (time, 0.0, 0.0, 0.1))
         assert dy > 0.7
 
     def test_nodes_left_alone_are_those_that_would_not_change(self) -> None:
@@ -76,11 +76,11 @@ class TestTimeToGo:
         time[10, 50] = 0.0
         eikonal.sweep_down(time, np.full(time.shape, 1.0), 0.15)
         for x in np.arange(0.6, 3.0, 0.1):
-            way = eikonal.way_down(x, 1.57, time, time, 0.0, 0.0, 0.15, 0.25, 100)
+            way = eikonal.way_down(x, 1.57, (time, 0.0, 0.0, 0.15), time, 0.25, 100)
             length_m = float(np.hypot(*np.diff(way[:, :2], axis=0).T).sum())
             assert np.hypot(way[-1, 0] - 7.5, way[-1, 1] - 1.5) <= 0.2
             assert length_m <= 7.5 - x + 0.25
-        assert len(eikonal.way_down(0.6, 1.57, time, time, 0.0, 0.0, 0.15, 0.25, 8)) == 9
+        assert len(eikonal.way_down(0.6, 1.57, (time, 0.0, 0.0, 0.15), time, 0.25, 8)) == 9
 
     def test_a_way_does_not_turn_back_at_its_goal(self) -> None:
         """Its last steps went to and fro, and mates who followed one took it for coming against them."""
@@ -89,7 +89,7 @@ class TestTimeToGo:
         eikonal.sweep_down(time, np.full(time.shape, 1.0), 0.15)
         for x in np.arange(0.6, 7.0, 0.1):
             for y in (1.2, 1.57, 2.2):
-                legs = np.diff(eikonal.way_down(x, y, time, time, 0.0, 0.0, 0.15, 0.25, 100)[:, :2], axis=0)
+                legs = np.diff(eikonal.way_down(x, y, (time, 0.0, 0.0, 0.15), time, 0.25, 100)[:, :2], axis=0)
                 assert ((legs[1:] * legs[:-1]).sum(axis=1) > 0.0).all()
 
     def test_a_disc_that_fills_the_only_door_leaves_no_way(self) -> None:
@@ -100,7 +100,8 @@ class TestTimeToGo:
         eikonal.sweep_down(time, slowness, 0.1)
         for middle, leads_on in (((3.0, 2.0), False), ((3.0, 3.5), True)):
             discs = np.array([[*middle, 0.4]])
-            *_, here = eikonal.detour(time, slowness, 0.0, 0.0, 0.1, 2.0, 2.0, 2.0, discs, 0.5, 1.0)
+            field = time, 0.0, 0.0, 0.1
+            _, here = eikonal.detour(field, slowness, 2.0, 2.0, 2.0, discs, 0.5, 1.0)
             assert math.isfinite(here) is leads_on
 
     def test_a_goal_that_somebody_stands_on_is_come_near_to(self) -> None:
@@ -109,7 +110,8 @@ class TestTimeToGo:
         time[20, 30] = 0.0
         eikonal.sweep_down(time, slowness, 0.1)
         discs = np.array([[3.0, 2.0, 0.7]])
-        around, x0, y0, here = eikonal.detour(time, slowness, 0.0, 0.0, 0.1, 1.5, 2.0, 2.0, discs, 0.5, 1.0)
+        field = time, 0.0, 0.0, 0.1
+        (around, x0, y0, _), here = eikonal.detour(field, slowness, 1.5, 2.0, 2.0, discs, 0.5, 1.0)
         assert here == pytest.approx(1.5, rel=0.1)
         row, column = np.unravel_index(np.argmin(around), around.shape)
         assert 0.7 <= math.hypot(x0 + 0.1 * column - 3.0, y0 + 0.1 * row - 2.0) + 1e-9 < 0.85

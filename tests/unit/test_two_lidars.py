@@ -59,8 +59,8 @@ def seen(sheet: LidarConfig, body: Pose2, walls: FloatArray = HALL, posts: Float
     angles, out = sheet.beam_angles_rad(), np.full(sheet.beams, sheet.max_range_m)
     turned = angles - angles[0]
     first_rad = at.theta_rad + float(angles[0])
-    looks = (np.cos(turned), np.sin(turned))
-    narrow_fan(out, at.x_m, at.y_m, first_rad, sheet.beam_step_rad, *looks, sheet.max_range_m, walls, posts)
+    fan = 0.0, sheet.beam_step_rad, np.cos(turned), np.sin(turned), sheet.max_range_m
+    narrow_fan(out, at.x_m, at.y_m, first_rad, fan, walls, posts)
     return out
 
 

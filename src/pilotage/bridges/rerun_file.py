@@ -95,9 +95,7 @@ def _world(rr: Any, stream: Any, data: RunData) -> None:
         rows, columns = np.nonzero(data.grid.cells >= 50)
         cell_m = data.grid.resolution_m
         inner = np.column_stack([(columns + 0.5) * cell_m, (len(data.grid.cells) - rows - 0.5) * cell_m])
-        origin = data.grid.origin
-        c, s = np.cos(origin.theta_rad), np.sin(origin.theta_rad)
-        places = inner @ np.array([[c, s], [-s, c]]) + (origin.x_m, origin.y_m)
+        places = data.grid.origin.placed(inner)
         stream.log(
             "/world/cells", rr.Points3D(_flat(places), colors=[GREY], radii=[0.5 * cell_m]), static=True
         )

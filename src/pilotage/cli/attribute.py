@@ -7,12 +7,11 @@ from typing import Annotated, Any
 
 import typer
 
-from pilotage.cli.options import Json, Overrides, Plugins, WorkerCount
-from pilotage.cli.output import print_columns, print_json, print_line
+from pilotage.cli.options import Json, MissionName, Overrides, Plugins, Quiet, WorkerCount
+from pilotage.cli.output import print_columns
 from pilotage.cli.study import (
     TIMEOUT_S,
     Dask,
-    Quiet,
     Report,
     Resume,
     RetryFailed,
@@ -20,12 +19,12 @@ from pilotage.cli.study import (
     Studies,
     TrialTimeout,
     WorkerMemory,
-    run_study_quietly,
+    run_and_tell,
 )
 
 
 def attribute(
-    mission: Annotated[str, typer.Argument(metavar="MISSION|FILE", help="A shipped name or a YAML file.")],
+    mission: MissionName,
     overrides: Overrides = None,
     trials: Annotated[int, typer.Option("--trials", metavar="N", min=2, help="Seeds for every oracle.")] = 30,
     workers: WorkerCount = None,
@@ -46,17 +45,7 @@ def attribute(
 
     options = StudyOptions(workers, dask, resume, retry_failed, trial_timeout, worker_memory)
     made = attribution_study(mission, overrides or (), trials)
-    folder = out / made.name
-    ran = run_study_quietly(made, folder, options, Show(json, report, quiet))
-    if not ran.whole:
-        return ran.code
-    answer = attribution_of(folder)
-    if json:
-        print_json(answer | ({} if ran.page is None else {"report": str(ran.page)}))
-    elif not quiet:
-        _print(answer)
-        print_line(f"report: {ran.page}" if ran.page is not None else f"study: {folder}")
-    return ran.code
+    return run_and_tell(made, out / made.name, options, Show(json, report, quiet, attribution_of, _print))
 
 
 def _print(answer: dict[str, Any]) -> None:

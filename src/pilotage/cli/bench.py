@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 import typer
 
 from pilotage.cli.options import Json, Overrides, Plugins, Seed, WorkerCount, parse_out
-from pilotage.cli.output import print_columns, print_json, print_line, stdout_for_json
+from pilotage.cli.output import print_columns, print_json, print_line, stdout_for_json, worded
 from pilotage.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -264,10 +264,7 @@ def bench_scen(
     if json:
         print_json(answer)
     else:
-        shown = {key: value for key, value in answer.items() if key != "failures"}
-        print_columns(
-            (key, f"{value:.4g}" if isinstance(value, float) else str(value)) for key, value in shown.items()
-        )
+        print_columns((key, worded(value)) for key, value in answer.items() if key != "failures")
         for failure in answer["failures"]:
             print_line(f"missed: {failure}")
     return 0 if answer["success"] else 1

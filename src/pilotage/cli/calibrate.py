@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from pilotage.cli.options import Json, Out, Overrides, Seed
-from pilotage.cli.output import print_columns, print_json, stdout_for_json
+from pilotage.cli.output import print_answer, stdout_for_json
 from pilotage.core.errors import InputError, unknown_name
 
 AXES = ("x", "y", "z")
@@ -137,10 +137,7 @@ def calibrate(
             from pilotage.report import write_report
 
             answer["report"] = str(write_report(result.folder))
-    if json:
-        print_json(answer)
-    else:
-        _print(answer)
+    print_answer(answer, _rows(answer), as_json=json)
     return 0
 
 
@@ -158,9 +155,9 @@ def _check_commands(logs: list[Path] | None, form: str | None, simulated: bool) 
         raise InputError("calibrate commands: --set and --seed are for simulated runs; leave them out")
 
 
-def _print(answer: Mapping[str, Any]) -> None:
-    """Print the estimates with their intervals, the offset's shape and where everything is."""
-    rows = []
+def _rows(answer: Mapping[str, Any]) -> list[tuple[str, ...]]:
+    """The estimates with their intervals, the offset's shape and where everything is."""
+    rows: list[tuple[str, ...]] = []
     for key, value in answer.items():
         if isinstance(value, Mapping) and {"value", "low", "high"} <= set(value):
             rows.append((key, f"{value['value']:.5g}", f"{value['low']:.5g} to {value['high']:.5g}"))
@@ -185,5 +182,4 @@ def _print(answer: Mapping[str, Any]) -> None:
         for entry in answer.get("gyroscope", ())
         if entry["moving"]
     ]
-    rows += [("warning", "", text) for text in answer.get("warnings", ())]
-    print_columns(rows)
+    return rows + [("warning", "", text) for text in answer.get("warnings", ())]

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from pilotage.cli.options import Json, Plugins
-from pilotage.cli.output import print_columns, print_json
+from pilotage.cli.output import print_answer
 
 
 def components(
@@ -23,10 +23,8 @@ def components(
     from pilotage.experiments.catalogue import roles
 
     rows = registered(name)
-    if json:
-        print_json({"components" if name is None or name in roles() else "parameters": rows})
-    else:
-        print_columns(rows)
+    what = "components" if name is None or name in roles() else "parameters"
+    print_answer({what: rows}, rows, as_json=json)
 
 
 def schema(plugin: Plugins = None) -> None:  # noqa: ARG001 - loaded while the options are read
@@ -41,7 +39,4 @@ def missions(json: Json = False) -> None:
     from pilotage.experiments.catalogue import missions as shipped
 
     rows = shipped()
-    if json:
-        print_json(dict(rows))
-    else:
-        print_columns(rows)
+    print_answer(dict(rows), rows, as_json=json)

@@ -8,7 +8,7 @@ from typing import Annotated, TypeAlias
 import typer
 
 from pilotage.cli.options import Json
-from pilotage.cli.output import print_columns, print_json, print_line
+from pilotage.cli.output import print_answer, print_json, print_line
 
 MAP_HELP = "A shipped map's name or a file: walls, a sheet, a ROS map, MovingAI, an image, heights."
 Resolution: TypeAlias = Annotated[
@@ -31,10 +31,7 @@ def draw(
 
     drawn = drawn_by(map_, out, resolution_m=resolution)
     answer = {**drawn.layers, "picture": str(drawn.path)}
-    if json:
-        print_json(answer)
-    else:
-        print_columns((key, _in_words(value)) for key, value in answer.items())
+    print_answer(answer, [(key, _in_words(value)) for key, value in answer.items()], as_json=json)
 
 
 def _in_words(value: object) -> str:

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from pilotage.cli.options import Json
-from pilotage.cli.output import print_columns, print_json
+from pilotage.cli.output import print_answer, worded
 from pilotage.core.errors import InputError
 
 
@@ -88,10 +88,5 @@ def _relations(
 
 
 def _print(answer: Mapping[str, float | int | str | bool], json: bool) -> int:
-    if json:
-        print_json(answer)
-    else:
-        print_columns(
-            (key, f"{value:.6g}" if isinstance(value, float) else str(value)) for key, value in answer.items()
-        )
+    print_answer(answer, [(key, worded(value, 6)) for key, value in answer.items()], as_json=json)
     return 0

@@ -8,18 +8,17 @@ from typing import Annotated, Any
 
 import typer
 
-from pilotage.cli.options import Json, Overrides, Plugins, Seed
-from pilotage.cli.output import print_columns, print_json, stdout_for_json
+from pilotage.cli.options import Json, MissionName, Overrides, Plugins, Seed
+from pilotage.cli.output import print_answer, stdout_for_json, worded
 from pilotage.core.errors import InputError
 
 Duration = Annotated[
     float | None, typer.Option(metavar="S", help="Of the robot's time; default as long as it takes.")
 ]
-Named = Annotated[str, typer.Argument(metavar="MISSION|FILE", help="A shipped name or a YAML file.")]
 
 
 def serve(
-    mission: Named,
+    mission: MissionName,
     speed: Annotated[float, typer.Option(metavar="X", help="Simulated seconds a second.")] = 1.0,
     duration: Duration = None,
     seed: Seed = None,
@@ -38,7 +37,7 @@ def serve(
 
 
 def drive(
-    mission: Named,
+    mission: MissionName,
     ros2: Annotated[bool, typer.Option("--ros2", help="Over live topics of ROS 2.")] = False,
     duration: Duration = None,
     seed: Seed = None,
@@ -65,17 +64,10 @@ def _seconds(duration: float | None) -> float | None:
 
 
 def _print(answer: Mapping[str, Any], json: bool) -> None:
-    if json:
-        print_json(answer)
-        return
     rows = []
     for key, value in answer.items():
         if isinstance(value, Mapping):
-            rows += [(f"{key} {inner}", _text(item)) for inner, item in value.items()]
+            rows += [(f"{key} {inner}", worded(item, 6)) for inner, item in value.items()]
         else:
-            rows.append((key, _text(value)))
-    print_columns(rows)
-
-
-def _text(value: Any) -> str:
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
+            rows.append((key, worded(value, 6)))
+    print_answer(answer, rows, as_json=json)

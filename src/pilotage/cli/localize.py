@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from pilotage.cli.options import Json, Out, Overrides, Plugins
-from pilotage.cli.output import print_columns, print_json, print_line, stdout_for_json
+from pilotage.cli.options import Json, Out, Overrides, Plugins, RunReport
+from pilotage.cli.output import print_answer, print_line, stdout_for_json, worded
 from pilotage.cli.plan import parse_pose
 from pilotage.core.errors import InputError, unknown_name
 
@@ -91,7 +91,7 @@ def localize(
     ] = None,
     overrides: Overrides = None,
     out: Out = Path("runs"),
-    report: Annotated[bool, typer.Option(help="Write report.html into the run folder.")] = True,
+    report: RunReport = True,
     json: Json = False,
     plugin: Plugins = None,  # noqa: ARG001 - loaded while the options are read
 ) -> int:
@@ -137,11 +137,9 @@ def localize(
         print_line(line, sys.stderr)
     if len(result.left_out) > NAMED:
         print(f"and {len(result.left_out) - NAMED} more", file=sys.stderr)
-    if json:
-        print_json(result.metrics)
-    else:
-        rows = [(key, _text(value)) for key, value in result.metrics.items()]
-        print_columns([*rows, ("report", str(page))] if page is not None else rows)
+    rows = [(key, _text(value)) for key, value in result.metrics.items()]
+    rows += [("report", str(page))] if page is not None else []
+    print_answer(result.metrics, rows, as_json=json)
     return 0 if result.metrics["success"] else 1
 
 
@@ -162,4 +160,4 @@ def _text(value: object) -> str:
         return ", ".join(f"{key} {_text(item)}" for key, item in value.items())
     if isinstance(value, list | tuple):
         return ", ".join(_text(item) for item in value)
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    return worded(value)

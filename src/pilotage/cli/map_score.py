@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from pilotage.cli.options import Json
-from pilotage.cli.output import print_columns, print_json
+from pilotage.cli.output import print_answer
 
 
 def map_score(
@@ -32,10 +32,7 @@ def map_score(
     visits = None if visited is None else read_visits(visited, robots.shape)
     score = score_cell_map(robots, true, visits).as_dict()
     changes = shift_changes(robots, true, visits)
-    if json:
-        print_json(score | {"shift_changes": changes})
-    else:
-        print_columns(_rows(score, changes))
+    print_answer(score | {"shift_changes": changes}, _rows(score, changes), as_json=json)
 
 
 def _rows(score: dict[str, Any], changes: dict[str, dict[str, float]]) -> list[tuple[str, ...]]:

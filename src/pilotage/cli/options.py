@@ -37,6 +37,11 @@ def parse_out(text: str) -> Path:
 Json: TypeAlias = Annotated[
     bool, typer.Option("--json", help="Print one JSON object on standard output and nothing else there.")
 ]
+MissionName: TypeAlias = Annotated[
+    str, typer.Argument(metavar="MISSION|FILE", help="A shipped name or a YAML file.")
+]
+Quiet: TypeAlias = Annotated[bool, typer.Option("--quiet", help="Show neither progress nor summary.")]
+RunReport: TypeAlias = Annotated[bool, typer.Option(help="Write report.html into the run folder.")]
 Out: TypeAlias = Annotated[
     Path, typer.Option(metavar="DIR", parser=parse_out, help="Folder in which the run's own folder is made.")
 ]

@@ -56,6 +56,19 @@ def print_columns(rows: Iterable[Sequence[str]]) -> None:
         print("  ".join(padded).rstrip())
 
 
+def print_answer(answer: Mapping[str, Any], rows: Iterable[Sequence[str]], *, as_json: bool) -> None:
+    """Print an answer as one JSON object, or the rows that tell it."""
+    if as_json:
+        print_json(answer)
+    else:
+        print_columns(rows)
+
+
+def worded(value: object, digits: int = 4) -> str:
+    """A value of an answer for a row; numbers to so many digits."""
+    return f"{value:.{digits}g}" if isinstance(value, float) else str(value)
+
+
 def tell_if_cold() -> None:
     """Tell who watches why it takes so long where nothing is compiled yet."""
     from pilotage.kernels.code_cache import cache_is_cold

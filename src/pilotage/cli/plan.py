@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from pilotage.cli.options import Json, Overrides, Plugins, Seed
-from pilotage.cli.output import print_columns, print_json, stdout_for_json, tell_if_cold
+from pilotage.cli.output import print_answer, stdout_for_json, tell_if_cold, worded
 from pilotage.core.errors import InputError
 
 
@@ -61,10 +61,8 @@ def plan(
             seed=seed or 0,
             set=overrides or (),
         ).answer
-    if json:
-        print_json(answer)
-    else:
-        print_columns((key, _show(value)) for key, value in answer.items() if key != "path")
+    rows = [(key, _show(value)) for key, value in answer.items() if key != "path"]
+    print_answer(answer, rows, as_json=json)
     return 0 if answer["success"] else 1
 
 
@@ -105,6 +103,4 @@ def parse_outline(text: str) -> float | list[tuple[float, ...]]:
 
 
 def _show(value: Any) -> str:
-    if isinstance(value, float):
-        return f"{value:.4g}" if math.isfinite(value) else "-"
-    return str(value)
+    return "-" if isinstance(value, float) and not math.isfinite(value) else worded(value)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pilotage.cli.options import Json, Out, Overrides, Plugins, Seed
+from pilotage.cli.options import Json, Out, Overrides, Plugins, Quiet, RunReport, Seed
 from pilotage.cli.output import print_json, print_line, progress_line, stdout_for_json, tell_if_cold
 from pilotage.core.errors import InputError
 from pilotage.core.shown import visible
@@ -27,8 +27,8 @@ def run(
     out: Out = Path("runs"),
     json: Json = False,
     plugin: Plugins = None,  # noqa: ARG001 - loaded while the options are read
-    report: Annotated[bool, typer.Option(help="Write report.html into the run folder.")] = True,
-    quiet: Annotated[bool, typer.Option("--quiet", help="Show neither progress nor summary.")] = False,
+    report: RunReport = True,
+    quiet: Quiet = False,
     row: Annotated[
         str | None, typer.Option("--from", metavar="STUDY:ROW", help="One trial of a study again.")
     ] = None,

@@ -10,8 +10,8 @@ from typing import Annotated
 
 import typer
 
-from pilotage.cli.options import Json, Out
-from pilotage.cli.output import print_columns, print_json, stdout_for_json
+from pilotage.cli.options import Json, Out, Quiet, RunReport
+from pilotage.cli.output import print_columns, print_json, stdout_for_json, worded
 from pilotage.face.progress import StatusLine
 
 _TOLD = (
@@ -52,9 +52,9 @@ def slam(
         typer.Option(metavar="RUN", help="Extend the map of an earlier run; begin anywhere in it."),
     ] = None,
     out: Out = Path("runs"),
-    report: Annotated[bool, typer.Option(help="Write report.html into the run folder.")] = True,
+    report: RunReport = True,
     json: Json = False,
-    quiet: Annotated[bool, typer.Option("--quiet", help="Show neither progress nor summary.")] = False,
+    quiet: Quiet = False,
 ) -> int:
     """Map a recording: scans to a map, a path, and how sure both are."""
     from pilotage.experiments.slam import read_slam_config, slam_log
@@ -72,16 +72,12 @@ def slam(
     if json:
         print_json(metrics)
     elif not quiet:
-        rows = [(key, _text(metrics[key])) for key in _TOLD if key in metrics]
+        rows = [(key, worded(metrics[key])) for key in _TOLD if key in metrics]
         rows += [("warning", str(text)) for text in run.warnings]
         if where is not None:
             rows.append(("report" if page else "run_dir", str(page or where)))
         print_columns(rows)
     return 0 if run.metrics["success"] else 1
-
-
-def _text(value: object) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 @contextmanager

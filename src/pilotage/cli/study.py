@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pilotage.cli.options import Json, Overrides, Plugins, WorkerCount, parse_out
+from pilotage.cli.options import Json, MissionName, Overrides, Plugins, Quiet, WorkerCount, parse_out
 from pilotage.cli.output import print_columns, print_json, print_line, stdout_for_json
 from pilotage.cli.study_line import StudyLine
 from pilotage.core.errors import InputError
@@ -53,7 +53,6 @@ Studies = Annotated[
     typer.Option("--out", metavar="DIR", parser=parse_out, help="Folder that the study's folder is made in."),
 ]
 Report = Annotated[bool, typer.Option(help="Write report.html into the study's folder.")]
-Quiet = Annotated[bool, typer.Option("--quiet", help="Show neither progress nor summary.")]
 
 
 def study(
@@ -90,11 +89,11 @@ def study(
     changes: dict[str, Any] = {} if trials is None else {"trials": trials}
     loaded = load_study(name, changes)
     folder = Path(name) if is_study_folder(name) else out / loaded.name
-    return run_and_tell(loaded, folder, options, Show(json, report, quiet))
+    return run_and_tell(loaded, folder, options, Show(json, report, quiet, _answer_of, _print_cells))
 
 
 def sweep(
-    mission: Annotated[str, typer.Argument(metavar="MISSION|FILE", help="A shipped name or a YAML file.")],
+    mission: MissionName,
     vary: Annotated[
         list[str] | None,
         typer.Option(
@@ -132,16 +131,21 @@ def sweep(
     if not all(asked):
         raise InputError(f"--metrics '{metrics}': expected names with commas between, M1,M2")
     made = sweep_study(mission, vary or (), overrides or (), trials, asked, name)
-    return run_and_tell(made, out / made.name, options, Show(json, report, quiet))
+    return run_and_tell(made, out / made.name, options, Show(json, report, quiet, _answer_of, _print_cells))
 
 
 @dataclass(frozen=True, slots=True)
 class Show:
-    """What a study's command shows: one JSON object, a page, progress and summary."""
+    """What a study's command shows: one JSON object, a page, progress and summary.
+
+    What came out is read from the study's folder by ``answer_of``, and printed for people by ``tell``.
+    """
 
     json: bool
     report: bool
     quiet: bool
+    answer_of: Callable[[Path], dict[str, Any]]
+    tell: Callable[[dict[str, Any]], None]
 
 
 def _list(json: bool) -> int:
@@ -160,19 +164,23 @@ def _list(json: bool) -> int:
     return 0
 
 
+def _answer_of(folder: Path) -> dict[str, Any]:
+    from pilotage.experiments.studies.findings import study_object
+    from pilotage.experiments.studies.table import read_study
+
+    return study_object(read_study(folder))
+
+
 def run_and_tell(loaded: Study, folder: Path, options: StudyOptions, show: Show) -> int:
     """Run a study, write its exports and its page, and say what came out."""
     ran = run_study_quietly(loaded, folder, options, show)
     if not ran.whole:
         return ran.code
-    from pilotage.experiments.studies.findings import study_object
-    from pilotage.experiments.studies.table import read_study
-
-    answer = study_object(read_study(folder))
+    answer = show.answer_of(folder)
     if show.json:
         print_json(answer | ({} if ran.page is None else {"report": str(ran.page)}))
     elif not show.quiet:
-        _print_cells(answer)
+        show.tell(answer)
         print_line(f"report: {ran.page}" if ran.page is not None else f"study: {folder}")
     return ran.code
 

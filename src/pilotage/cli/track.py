@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 from pilotage.cli.options import Json
-from pilotage.cli.output import print_columns, print_json, print_line
+from pilotage.cli.output import print_answer, print_line
 from pilotage.core.whole_file import made_folder
 from pilotage.face.progress import StatusLine
 
@@ -79,19 +79,15 @@ def track(
     if broke is not None:
         promised = scene.film.promised
         print_line(f"pilotage: {video}: breaks off at frame {broke} of {promised}", sys.stderr)
-    if json:
-        print_json(values)
-    else:
-        print_columns(
-            [
-                ("frames", str(values["frames"])),
-                ("tracked", str(values["tracked"])),
-                ("corners_px", "  ".join(f"{x:.1f},{y:.1f}" for x, y in values["corners_px"])),
-                ("visited_cells", f"{values['visited_count']} of {grid * grid}"),
-                ("jitter_px", f"{values['jitter_px']:.2f}"),
-                *(("written", str(path)) for path in written),
-            ]
-        )
+    rows = [
+        ("frames", str(values["frames"])),
+        ("tracked", str(values["tracked"])),
+        ("corners_px", "  ".join(f"{x:.1f},{y:.1f}" for x, y in values["corners_px"])),
+        ("visited_cells", f"{values['visited_count']} of {grid * grid}"),
+        ("jitter_px", f"{values['jitter_px']:.2f}"),
+        *(("written", str(path)) for path in written),
+    ]
+    print_answer(values, rows, as_json=json)
     return 0 if values["tracked"] or values["frames"] == 1 else 1
 
 

@@ -257,4 +257,4 @@ def clearance_m(states: FloatArray, walls: SegmentMap, body: Footprint) -> float
     columns = states[:, 0], states[:, 1], np.unwrap(states[:, 2])
     fine = np.column_stack([np.interp(at, s, column) for column in columns])
     both = np.ascontiguousarray(np.vstack([fine, states[:, :3]]))
-    return float(least_along(both, body.points_m, body.radius_m, walls.segments_m, walls.circles_m))
+    return float(least_along(both, body.outline, walls.segments_m, walls.circles_m))

@@ -29,9 +29,7 @@ class RobotRun:
         All its goals in the order in which it was to visit them; of an order that it chose, how good it is.
     trace
         Columns by name, one value a recorded step.
-    units
-        Of the telemetry's columns.
-    plans, counts, results, planning_time_s
+    plans, counts, results
         From its journal.
     status, reason
         What the robot itself says of its task.
@@ -50,11 +48,9 @@ class RobotRun:
     rounds: Rounds | None
     stack: StackConfig
     trace: dict[str, FloatArray]
-    units: Mapping[str, str]
     plans: Sequence[PlannedPath]
     counts: Mapping[str, int]
     results: Mapping[str, object]
-    planning_time_s: float
     status: StackStatus
     reason: str
     collisions: int

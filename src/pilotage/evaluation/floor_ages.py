@@ -9,7 +9,7 @@ import numpy as np
 import scipy
 
 from pilotage.core.types import FloatArray, Pose2
-from pilotage.kernels.scans.mounted import Fan
+from pilotage.kernels.scans.rays import Fan
 from pilotage.kernels.scans.seen_cells import mark_seen
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.lidar import LidarConfig

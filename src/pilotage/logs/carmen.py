@@ -51,8 +51,6 @@ class CarmenLog:
         (M,) and (M, 3) of the ODOM lines.
     readings_before
         (N,) ODOM lines before each scan.
-    backward_times
-        How many scans carry a time before that of the scan before.
     cut_short
         Whether the file ends within a line, which is left out then, or gzipped data have no end.
     """
@@ -67,7 +65,6 @@ class CarmenLog:
     odometry_t_s: FloatArray
     odometry: FloatArray
     readings_before: IntArray
-    backward_times: int
     cut_short: bool = False
 
     def angles_rad(self, scan: int) -> FloatArray:
@@ -127,10 +124,9 @@ def read_carmen(path: Path) -> CarmenLog:
     ranges_m = np.full((beams.size, int(beams.max())), np.nan)
     for row, scan in enumerate(scans):
         ranges_m[row, : beams[row]] = scan.ranges_m
-    t_s = np.array([scan.t_s for scan in scans])
     poses = np.array(odometry).reshape(-1, 4)
     return CarmenLog(
-        t_s,
+        np.array([scan.t_s for scan in scans]),
         ranges_m,
         beams,
         np.array([scan.first_rad for scan in scans]),
@@ -140,7 +136,6 @@ def read_carmen(path: Path) -> CarmenLog:
         poses[:, 3].copy(),
         poses[:, :3].copy(),
         np.array(readings_before, np.int64),
-        int(np.count_nonzero(np.diff(t_s) < 0.0)),
         cut_short,
     )
 

@@ -34,8 +34,6 @@ class Course:
         x, y, theta.
     goal_xy_m
         Beyond the last barrier.
-    bottleneck_m
-        Width of the openings between the posts' surfaces.
     openings
         (B, 3) x, y of each opening's middle and the direction through it.
     """
@@ -43,7 +41,6 @@ class Course:
     circles_m: FloatArray
     start: tuple[float, float, float]
     goal_xy_m: tuple[float, float]
-    bottleneck_m: float
     openings: FloatArray
 
 
@@ -92,9 +89,7 @@ def make_course(
         place = generator.uniform([-half, 0.8], [half, length])
         if _distance_to_way(place, way) > 0.55 + RADIUS_M:
             loose.append([float(place[0]), float(place[1]), RADIUS_M])
-    return Course(
-        np.array(circles + loose), (0.0, 0.0, 0.5 * math.pi), goal, bottleneck_m, np.array(openings)
-    )
+    return Course(np.array(circles + loose), (0.0, 0.0, 0.5 * math.pi), goal, np.array(openings))
 
 
 def _wall(begin: tuple[float, ...], end: tuple[float, ...]) -> list[list[float]]:

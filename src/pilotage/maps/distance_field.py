@@ -77,6 +77,11 @@ class DistanceField:
         return DistanceField(values, (xmin, ymin), resolution_m, world.segments_m, world.circles_m)
 
     @property
+    def nodes_m(self) -> field.Field:
+        """Distances at the nodes, and where these are, as kernels take it."""
+        return self.distance_m, *self.origin_xy_m, self.resolution_m
+
+    @property
     def bounds_m(self) -> tuple[float, float, float, float]:
         """xmin, ymin, xmax, ymax that the nodes span."""
         ny, nx = self.distance_m.shape
@@ -95,4 +100,4 @@ class DistanceField:
     def at(self, points_xy_m: FloatArray) -> FloatArray:
         """Interpolated distance at points (K, 2); outside the grid 0. Returns (K,)."""
         points = np.ascontiguousarray(points_xy_m, dtype=np.float64).reshape(-1, 2)
-        return field.interpolate(points, self.distance_m, *self.origin_xy_m, self.resolution_m)
+        return field.interpolate(points, self.nodes_m)

@@ -41,11 +41,6 @@ class FloorMarkings:
         """What somebody knows who was told of the sheet but not of what is on it."""
         return FloorMarkings(self.size_m, self.cells, np.zeros((0, 4)), self.tape_width_m, self.edge_is_dark)
 
-    @property
-    def cell_m(self) -> tuple[float, float]:
-        """Width and height of a cell."""
-        return self.size_m[0] / self.cells[0], self.size_m[1] / self.cells[1]
-
     def holds(self, x_m: float, y_m: float) -> bool:
         """Whether a point is on the sheet."""
         return 0.0 <= x_m <= self.size_m[0] and 0.0 <= y_m <= self.size_m[1]

@@ -59,7 +59,12 @@ class NearestObstacles:
         index = nearest.nearest_items(xmin, ymin, resolution_m, nx, ny, items)
         return NearestObstacles(index, (xmin, ymin), resolution_m, items)
 
+    @property
+    def nodes(self) -> nearest.NearestGrid:
+        """As kernels take it."""
+        return self.index, *self.origin_xy_m, self.resolution_m, self.items
+
     def at(self, points_xy_m: FloatArray) -> FloatArray:
         """Distance (K,) at points (K, 2), also from inside a disc to its edge."""
         x, y = np.array(np.reshape(points_xy_m, (-1, 2)).T, dtype=np.float64, order="C")
-        return nearest.distances_by_node(x, y, self.index, *self.origin_xy_m, self.resolution_m, self.items)
+        return nearest.distances_by_node(x, y, *self.nodes)

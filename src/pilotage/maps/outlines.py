@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from pilotage.core.types import BoolArray, FloatArray
@@ -64,10 +62,8 @@ def rim_lines(grid: OccupancyGrid) -> FloatArray:
 def _in_map(sides: FloatArray, grid: OccupancyGrid) -> FloatArray:
     """Segments (N, 4) in cells from the lower-left corner as segments in the map frame."""
     sides = sides * grid.resolution_m
-    c, s = math.cos(grid.origin.theta_rad), math.sin(grid.origin.theta_rad)
-    turn = np.array([[c, s], [-s, c]])
-    corner = np.array([grid.origin.x_m, grid.origin.y_m])
-    return np.ascontiguousarray(np.hstack([sides[:, :2] @ turn + corner, sides[:, 2:] @ turn + corner]))
+    placed = grid.origin.placed
+    return np.ascontiguousarray(np.hstack([placed(sides[:, :2]), placed(sides[:, 2:])]))
 
 
 def _runs(marks: BoolArray) -> np.ndarray[tuple[int, int], np.dtype[np.int64]]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pilotage.core.errors import InputError
-from pilotage.core.types import FloatArray
+from pilotage.core.types import FloatArray, Pose2
 from pilotage.kernels.geometry import plane
 
 
@@ -77,7 +77,6 @@ class SegmentMap:
 
 def box_segments(x_m: float, y_m: float, length_m: float, width_m: float, theta_rad: float) -> FloatArray:
     """Return the (4, 4) sides of a box centred at x, y, its length along theta."""
-    c, s = np.cos(theta_rad), np.sin(theta_rad)
     half = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * np.array([length_m / 2, width_m / 2])
-    corners = half @ np.array([[c, s], [-s, c]]) + np.array([x_m, y_m])
+    corners = Pose2(x_m, y_m, theta_rad).placed(half)
     return np.hstack([corners, np.roll(corners, -1, axis=0)])

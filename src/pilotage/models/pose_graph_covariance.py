@@ -143,6 +143,16 @@ def _seen(
     return np.asarray(0.5 * (out + out.transpose(0, 2, 1)))
 
 
+def turns(theta_rad: FloatArray) -> FloatArray:
+    """(..., 3, 3) that turn x and y of poses by angles (...)."""
+    c, s = np.cos(theta_rad), np.sin(theta_rad)
+    out = np.zeros((*theta_rad.shape, 3, 3))
+    out[..., 0, 0] = out[..., 1, 1] = c
+    out[..., 0, 1], out[..., 1, 0] = -s, s
+    out[..., 2, 2] = 1.0
+    return out
+
+
 def relative_jacobians(
     first: FloatArray, second: FloatArray, turn_rad: float | FloatArray = 0.0
 ) -> tuple[FloatArray, FloatArray]:
@@ -153,10 +163,7 @@ def relative_jacobians(
     axes = first[:, 2] + turn_rad
     c, s = np.cos(axes), np.sin(axes)
     dx, dy = second[:, 0] - first[:, 0], second[:, 1] - first[:, 1]
-    by_second = np.zeros((first.shape[0], 3, 3))
-    by_second[:, 0, 0] = by_second[:, 1, 1] = c
-    by_second[:, 0, 1], by_second[:, 1, 0] = s, -s
-    by_second[:, 2, 2] = 1.0
+    by_second = turns(-axes)
     by_first = -by_second
     by_first[:, 0, 2] = -s * dx + c * dy
     by_first[:, 1, 2] = -c * dx - s * dy

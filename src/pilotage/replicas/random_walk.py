@@ -51,7 +51,6 @@ class RandomWalk:
         journal: Journal,
     ) -> None:
         knowledge = SheetKnowledge.of(robot, chart, task, config, "random-walk")
-        self._journal = journal
         offer(journal, self)
         self._channel = journal.channel({"turn_rad_s": "rad/s"})
         self._config = config

@@ -77,7 +77,6 @@ class SurroundCheck:
         self._channel = journal.channel({"goal_x_m": "m", "goal_y_m": "m", "far_hop": "1"})
         self._config = config
         self._drive = knowledge.drive
-        self._dt_s = knowledge.dt_s
         self._plan_every = max(1, round(config.planning_period_s / knowledge.dt_s))
         self._pose = WheelPose(knowledge, parts.heading)
         self._marks = CellMarks(knowledge, config.margin_cells)

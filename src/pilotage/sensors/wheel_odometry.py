@@ -30,6 +30,16 @@ class WheelOdometryConfig(SensorConfig):
     angle_scale: float = Field(default=1.0, gt=0.5, lt=2.0)
     angle_bias_rad_s: float = Field(default=0.0, gt=-1.0, lt=1.0)
 
+    @property
+    def densities(self) -> tuple[float, float, float, float]:
+        """Variances as ``increment_variances`` takes them."""
+        return (
+            self.distance_var_m2_per_m,
+            self.distance_var_m2_per_rad,
+            self.angle_var_rad2_per_rad,
+            self.angle_var_rad2_per_m,
+        )
+
     def as_numbers(self, setting: SensorSetting) -> tuple[Numbers, ...]:
         """Distance and turn; of a base that drives sideways the distance to the left besides."""
         motion, share = setting.motion, MOTION_FACTOR / self.rate_hz

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from functools import lru_cache
 from importlib import resources
@@ -123,13 +122,9 @@ def _with_landmarks(chart: WorldMap, world: WorldConfig) -> WorldMap:
 def bounds_of(grid: OccupancyGrid) -> tuple[float, float, float, float]:
     """The rectangle around a grid, which may be turned."""
     width, height = grid.size_m
-    c, s = math.cos(grid.origin.theta_rad), math.sin(grid.origin.theta_rad)
-    corners = np.array([[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]]) @ np.array(
-        [[c, s], [-s, c]]
-    )
-    (xmin, ymin), (xmax, ymax) = corners.min(axis=0), corners.max(axis=0)
-    x0, y0 = grid.origin.x_m, grid.origin.y_m
-    return x0 + float(xmin), y0 + float(ymin), x0 + float(xmax), y0 + float(ymax)
+    corners = grid.origin.placed(np.array([[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]]))
+    (xmin, ymin), (xmax, ymax) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
+    return xmin, ymin, xmax, ymax
 
 
 def _named(source: str, markings: MarkingsConfig) -> WorldMap:

@@ -78,7 +78,7 @@ def _truth(
 ) -> Truth:
     start = mission.start_of(mission.members[index])
     assert start is not None, "settled above"
-    return Truth(chart, segments_m, circles_m, pose_of(start), mission.run.dt_s)
+    return Truth(chart, segments_m, circles_m, pose_of(start))
 
 
 def _member(

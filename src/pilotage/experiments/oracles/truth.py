@@ -30,7 +30,6 @@ class Truth:
     obstacle_segments_m: FloatArray
     obstacle_circles_m: FloatArray
     start: Pose2
-    dt_s: float
     body: Body | None = None
 
     @property

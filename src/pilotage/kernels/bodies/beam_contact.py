@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from typing import TypeAlias
 
 import numpy as np
 
 from pilotage.kernels.arrays import BoolArray, FloatArray
 from pilotage.kernels.bodies.outline import signed_distance
 from pilotage.kernels.geometry.motion import turned_part
+from pilotage.kernels.geometry.solids import Outline
 from pilotage.kernels.jit import kernel
 
 NEARER_M = 1e-9
@@ -72,6 +74,12 @@ def _range_of(ranges: FloatArray, k: int, same: float) -> float:
     return total / count
 
 
+Kept: TypeAlias = tuple[float, float, float, float]
+"""What is kept from a laser's ends. An end is kept as far away as the first and that share of its range: what
+ends between a beam and the next, which passes it, sticks out by their distance at most. Deeper in the outline
+than the third is deep; ranges of neighbours that differ by no more than the fourth are of one surface."""
+
+
 @kernel
 def touches_an_end(
     ranges: FloatArray,
@@ -81,12 +89,8 @@ def touches_an_end(
     start: tuple[float, float, float],
     move: tuple[float, float, float],
     pieces: int,
-    corners: FloatArray,
-    radius: float,
-    margin: float,
-    between: float,
-    own: float,
-    same: float,
+    outline: Outline,
+    kept: Kept,
 ) -> bool:
     """Whether a confirmed end of a beam comes nearer than its margin, and nearer than it is, on a move.
 
@@ -105,16 +109,9 @@ def touches_an_end(
         around, at constant rates.
     pieces
         Poses on the way that are looked at.
-    corners, radius
-        (K, 2) of a polygon, none of a disc; of the disc around the axle that holds it.
-    margin, between
-        An end is kept as far away as this and that share of its range: what ends between a beam and the next,
-        which passes it, sticks out by their distance at most.
-    own
-        Deeper in the outline than this is deep.
-    same
-        Ranges of neighbours that differ by no more are of one surface.
     """
+    corners, radius, _ = outline
+    margin, between, own, same = kept
     x0, y0, theta0 = start
     ahead, lateral, angle = move
     poses = np.empty((pieces + 1, 4))
@@ -128,14 +125,14 @@ def touches_an_end(
         if not ranges[k] < reach:
             continue
         away = _range_of(ranges, k, same)
-        kept = margin + between * away
+        off = margin + between * away
         px, py = mount[0] + away * directions[k, 0], mount[1] + away * directions[k, 1]
-        if (px - x0) ** 2 + (py - y0) ** 2 >= (radius + swept + kept) ** 2:
+        if (px - x0) ** 2 + (py - y0) ** 2 >= (radius + swept + off) ** 2:
             continue
         now = _away(poses[0], px, py, corners, radius)
-        if now < -own or now >= swept + kept:
+        if now < -own or now >= swept + off:
             continue
-        least = min(kept, now - NEARER_M)
+        least = min(off, now - NEARER_M)
         i = max(1, math.floor((now - least) / piece))
         while i <= pieces:
             away = _away(poses[i], px, py, corners, radius)

@@ -9,8 +9,8 @@ from pilotage.kernels.bodies.drive import COLLISIONS, THETA, X, Y, drive
 from pilotage.kernels.geometry.motion import wrap
 from pilotage.kernels.geometry.solids import Fixed, Others, Outline
 from pilotage.kernels.jit import kernel_without_lock
-from pilotage.kernels.scans.mounted import Fan, mounted
-from pilotage.kernels.scans.rays import narrow_fan
+from pilotage.kernels.scans.mounted import mounted
+from pilotage.kernels.scans.rays import Fan, narrow_fan
 from pilotage.kernels.scans.sweep import narrow_grid_fan
 
 
@@ -71,7 +71,7 @@ def step_environments(
     to_go, ranges, reward, ended, late
         Out: (N, 2) distance and bearing of the goal, (N, beams), and (N,) each.
     """
-    first_beam, beam_step, cosines, sines, max_range = fan
+    max_range = fan[4]
     segments, circles, grid = fixed
     for i in range(first, last):
         state = states[i]
@@ -93,9 +93,8 @@ def step_environments(
         row = ranges[i]
         row[:] = max_range
         x, y, theta = mounted(state[X], state[Y], state[THETA], mount)
-        theta += first_beam
-        narrow_fan(row, x, y, theta, beam_step, cosines, sines, max_range, segments, circles)
-        narrow_grid_fan(row, x, y, theta, beam_step, cosines, sines, grid)
+        narrow_fan(row, x, y, theta, fan, segments, circles)
+        narrow_grid_fan(row, x, y, theta, fan, grid)
         if std > 0.0:
             for k in range(row.shape[0]):
                 if row[k] < max_range:

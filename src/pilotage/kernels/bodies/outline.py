@@ -8,6 +8,7 @@ import numpy as np
 
 from pilotage.kernels.arrays import FloatArray
 from pilotage.kernels.geometry.plane import distance_to_nearest, point_segment_distance
+from pilotage.kernels.geometry.solids import Outline
 from pilotage.kernels.jit import kernel
 
 
@@ -137,10 +138,9 @@ def outline_clearance(
 
 
 @kernel
-def least_along(
-    poses: FloatArray, corners: FloatArray, radius: float, segments: FloatArray, circles: FloatArray
-) -> float:
+def least_along(poses: FloatArray, outline: Outline, segments: FloatArray, circles: FloatArray) -> float:
     """Least clearance of an outline along poses (N, 3), where its disc's could be the least."""
+    corners, radius, _ = outline
     best = math.inf
     for k in range(poses.shape[0]):
         x, y, theta = poses[k, 0], poses[k, 1], poses[k, 2]

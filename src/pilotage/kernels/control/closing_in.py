@@ -8,6 +8,7 @@ from pilotage.kernels.arrays import FloatArray
 from pilotage.kernels.bodies.outline import signed_distance
 from pilotage.kernels.control.footprint import polygon_distance
 from pilotage.kernels.geometry.motion import wrap
+from pilotage.kernels.geometry.solids import Outline
 from pilotage.kernels.jit import kernel
 
 CLOSES_M = 1e-4
@@ -70,16 +71,13 @@ def closes_in(
 
 @kernel
 def drive_closes_in(
-    x: float,
-    y: float,
-    theta: float,
+    pose: tuple[float, float, float],
     v: float,
     w: float,
     hold: float,
     deceleration: float,
     dt: float,
-    corners: FloatArray,
-    radius: float,
+    outline: Outline,
     movers: FloatArray,
     keep: float,
 ) -> bool:
@@ -87,10 +85,10 @@ def drive_closes_in(
 
     ``movers`` (K, M, 3): discs at dt, 2 dt, ...; beyond the last ones time stands. Only those count that are
     within ``keep`` by then, and each stands while the robot moves: who drives away, and not merely past
-    (``AWAY``: places are vague), closes no gap. ``corners`` (C, 2), of none for a disc of that radius: their
-    sides may slide along somebody, whose place then does not matter, but they turn only away from him; a
-    middle inside the outline is nobody's.
+    (``AWAY``: places are vague), closes no gap. Sides may slide along somebody, whose place then does not
+    matter, but corners turn only away from him; a middle inside the outline is nobody's.
     """
+    (x, y, theta), (corners, radius, _) = pose, outline
     rate = w / v if v != 0.0 else 0.0
     speed, t = v, 0.0
     for k in range(10 * movers.shape[0]):

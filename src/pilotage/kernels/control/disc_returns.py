@@ -7,8 +7,7 @@ import math
 import numpy as np
 
 from pilotage.kernels.arrays import FloatArray
-from pilotage.kernels.control.safe_stop import Field
-from pilotage.kernels.geometry.field import interpolate_at
+from pilotage.kernels.geometry.field import Field, interpolate_at
 from pilotage.kernels.jit import kernel
 
 FITTED, NOT_ROUND = 0, 1

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from pilotage.kernels.arrays import FloatArray
+from pilotage.kernels.geometry.field import Field
 from pilotage.kernels.jit import kernel
 
 MOST_ROUNDS = 60
@@ -70,13 +71,12 @@ def sweep_down(time: FloatArray, slowness: FloatArray, spacing: float) -> int:
 
 
 @kernel
-def value_at(
-    x: float, y: float, time: FloatArray, x0: float, y0: float, spacing: float, blocked: float
-) -> float:
+def value_at(x: float, y: float, field: Field, blocked: float) -> float:
     """Interpolated between the finite nodes around a point, plus ``blocked`` by the share of the others.
 
     Infinite where there is none, or outside the grid.
     """
+    time, x0, y0, spacing = field
     u, v = (x - x0) / spacing, (y - y0) / spacing
     rows, columns = time.shape
     if not (0.0 <= u <= columns - 1 and 0.0 <= v <= rows - 1):
@@ -97,15 +97,13 @@ def value_at(
 
 
 @kernel
-def descent(
-    x: float, y: float, time: FloatArray, x0: float, y0: float, spacing: float
-) -> tuple[float, float]:
+def descent(x: float, y: float, field: Field) -> tuple[float, float]:
     """Unit direction in which the time falls fastest around a point; (0, 0) where nothing is known."""
-    reach = 1.5 * spacing
-    east = value_at(x + reach, y, time, x0, y0, spacing, 0.0)
-    west = value_at(x - reach, y, time, x0, y0, spacing, 0.0)
-    north = value_at(x, y + reach, time, x0, y0, spacing, 0.0)
-    south = value_at(x, y - reach, time, x0, y0, spacing, 0.0)
+    reach = 1.5 * field[3]
+    east = value_at(x + reach, y, field, 0.0)
+    west = value_at(x - reach, y, field, 0.0)
+    north = value_at(x, y + reach, field, 0.0)
+    south = value_at(x, y - reach, field, 0.0)
     if max(east, west, north, south) < np.inf:
         gx, gy = west - east, south - north
         norm = math.hypot(gx, gy)
@@ -113,11 +111,11 @@ def descent(
             return gx / norm, gy / norm
         return 0.0, 0.0
     # Beside a wall: the best of some directions.
-    best, bx, by = value_at(x, y, time, x0, y0, spacing, 0.0), 0.0, 0.0
+    best, bx, by = value_at(x, y, field, 0.0), 0.0, 0.0
     for k in range(16):
         angle = k * math.pi / 8.0
         cx, cy = math.cos(angle), math.sin(angle)
-        there = value_at(x + reach * cx, y + reach * cy, time, x0, y0, spacing, 0.0)
+        there = value_at(x + reach * cx, y + reach * cy, field, 0.0)
         if there < best:
             best, bx, by = there, cx, cy
     return bx, by
@@ -125,18 +123,15 @@ def descent(
 
 @kernel
 def detour(
-    time: FloatArray,
+    field: Field,
     slowness: FloatArray,
-    x0: float,
-    y0: float,
-    spacing: float,
     x: float,
     y: float,
     half_m: float,
     discs: FloatArray,
     slack_s: float,
     there_s: float,
-) -> tuple[FloatArray, float, float, float]:
+) -> tuple[Field, float]:
     """The time to go around a place once more, with discs in the way that are on no map.
 
     The values on the window's rim stay, those of them that lie ahead; inside they are found anew.
@@ -154,17 +149,18 @@ def detour(
 
     Returns
     -------
-    time, x0, y0, here
-        The window (r, c) with its origin, and the time at its middle: infinite where nothing leads on.
+    field, here
+        The window, and the time at its middle: infinite where nothing leads on.
     """
+    time, x0, y0, spacing = field
     rows, columns = time.shape
     c0 = max(0, math.floor((x - half_m - x0) / spacing))
     c1 = min(columns, math.ceil((x + half_m - x0) / spacing) + 1)
     r0 = max(0, math.floor((y - half_m - y0) / spacing))
     r1 = min(rows, math.ceil((y + half_m - y0) / spacing) + 1)
     if c1 - c0 < 2 or r1 - r0 < 2:
-        return np.full((2, 2), np.inf), x0, y0, np.inf
-    old = value_at(x, y, time, x0, y0, spacing, 0.0)
+        return (np.full((2, 2), np.inf), x0, y0, spacing), np.inf
+    old = value_at(x, y, field, 0.0)
     slow = slowness[r0:r1, c0:c1].copy()
     covered = False
     for k in range(discs.shape[0]):
@@ -186,27 +182,18 @@ def detour(
             if (rim and value < old + slack_s) or value <= near_s:
                 new[r, c] = value
     sweep_down(new, slow, spacing)
-    left, low = x0 + c0 * spacing, y0 + r0 * spacing
-    return new, left, low, value_at(x, y, new, left, low, spacing, 0.0)
+    window = (new, x0 + c0 * spacing, y0 + r0 * spacing, spacing)
+    return window, value_at(x, y, window, 0.0)
 
 
 @kernel
-def way_down(
-    x: float,
-    y: float,
-    time: FloatArray,
-    values: FloatArray,
-    x0: float,
-    y0: float,
-    spacing: float,
-    step: float,
-    steps: int,
-) -> FloatArray:
+def way_down(x: float, y: float, field: Field, values: FloatArray, step: float, steps: int) -> FloatArray:
     """The way down from a place: (steps + 1, 3) x, y, and ``values`` (rows, columns) at the nearest node.
 
     It ends earlier off the grid, and where the goal is: where ``PAST`` steps lead no nearer to it, or to and
     fro. What leads no nearer at its end is left out.
     """
+    time, x0, y0, spacing = field
     rows, columns = time.shape
     out = np.empty((steps + 1, 3))
     nearest, least = 0, np.inf
@@ -215,12 +202,12 @@ def way_down(
         if not (0 <= row < rows and 0 <= column < columns):
             break
         out[count - 1, 0], out[count - 1, 1], out[count - 1, 2] = x, y, values[row, column]
-        left = value_at(x, y, time, x0, y0, spacing, 0.0)
+        left = value_at(x, y, field, 0.0)
         if left < least - NEAR_S:
             least, nearest = left, count
         elif count >= nearest + PAST:
             break
-        dx, dy = descent(x, y, time, x0, y0, spacing)
+        dx, dy = descent(x, y, field)
         if (dx == 0.0 and dy == 0.0) or time[row, column] < 0.5 * step:
             break
         x, y = x + step * dx, y + step * dy
@@ -233,12 +220,9 @@ def way_down(
 def narrowest_down(
     x: float,
     y: float,
-    time: FloatArray,
+    field: Field,
     values: FloatArray,
     soon_values: FloatArray,
-    x0: float,
-    y0: float,
-    spacing: float,
     step: float,
     steps: int,
     few: int,
@@ -247,7 +231,8 @@ def narrowest_down(
 
     Infinite off the grid.
     """
-    way = way_down(x, y, time, values, x0, y0, spacing, step, steps)
+    _, x0, y0, spacing = field
+    way = way_down(x, y, field, values, step, steps)
     least = soon = np.inf
     for k in range(way.shape[0]):
         least = min(least, way[k, 2])

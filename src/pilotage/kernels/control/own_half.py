@@ -8,15 +8,14 @@ import numpy as np
 
 from pilotage.kernels.arrays import FloatArray
 from pilotage.kernels.bodies.outline import is_inside
+from pilotage.kernels.geometry.solids import Outline
 from pilotage.kernels.jit import kernel
 
 ROUNDING_M = 1e-6
 
 
 @kernel
-def poses_in_own_half(
-    poses: FloatArray, corners: FloatArray, radius: float, points: FloatArray, gap: float
-) -> int:
+def poses_in_own_half(poses: FloatArray, outline: Outline, points: FloatArray, gap: float) -> int:
     """How many of the poses, one after the other from now on, leave to each point its half.
 
     Between the body now and a point lies a line across the shortest way from one to the other, in the middle
@@ -28,13 +27,12 @@ def poses_in_own_half(
     ----------
     poses
         (K, 3) one after the other, seen from where the body is now.
-    corners, radius
-        Outline (C, 2) in the base frame, of none for a disc; and the disc around it.
     points
         (P, 2) in the base frame; those inside the outline are its own.
     gap
         Left between both.
     """
+    corners, radius, _ = outline
     moved = np.empty(poses.shape[0])
     for k in range(poses.shape[0]):
         moved[k] = math.hypot(poses[k, 0], poses[k, 1])

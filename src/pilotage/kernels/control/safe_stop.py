@@ -8,11 +8,9 @@ from typing import TypeAlias
 import numpy as np
 
 from pilotage.kernels.arrays import FloatArray
-from pilotage.kernels.geometry.field import interpolate_at
+from pilotage.kernels.geometry.field import Field, interpolate_at
 from pilotage.kernels.jit import kernel
 
-Field: TypeAlias = tuple[FloatArray, float, float, float]
-"""Values at nodes (rows, columns), the first node's x and y, and the spacing of the nodes."""
 Seen: TypeAlias = tuple[FloatArray, FloatArray, FloatArray]
 """Returns, base frame: the nearest around it (K, 2), of what may move (M, 2), of people (P, 2)."""
 

@@ -12,7 +12,6 @@ from pilotage.kernels.control.disc_returns import rotated, within
 from pilotage.kernels.control.eikonal import descent, value_at
 from pilotage.kernels.control.safe_stop import (
     ROLL_S,
-    Field,
     Seen,
     braking_turn,
     least_kept,
@@ -24,13 +23,14 @@ from pilotage.kernels.control.safe_stop import (
     steps_to_rest,
     stop_is_clear,
 )
+from pilotage.kernels.geometry.field import Field
 from pilotage.kernels.geometry.motion import exact_arc, wrap
 from pilotage.kernels.jit import kernel
 
 Window: TypeAlias = tuple[float, float, float, float, int, int]
 """Horizon, cost of a heading off the field, cost of nearness and the distance it begins at, speeds, turns."""
-Gate: TypeAlias = tuple[FloatArray, float, float, float, float, float, float, float]
-"""A place to pass and where to go from there: values at nodes as of a field, the place's x and y, how near is
+Gate: TypeAlias = tuple[Field, float, float, float, float]
+"""A place to pass and where to go from there: the field, the place's x and y, how near is
 there (below 0: there is no such place), and what is left from there on, the turn at it included."""
 
 SAMPLES = 4
@@ -78,7 +78,6 @@ def choose(
         there cuts a corner to the nearest heading in which it may set out and comes nearer.
     """
     near, strange, people = seen
-    time, x0, y0, spacing = field
     horizon_s, heading_cost, near_cost, soft_m, speeds, turns = window
     top, acceleration, deceleration, top_turn, turn_acceleration, period = (
         limits[0],
@@ -119,8 +118,8 @@ def choose(
         v = low_v + (high_v - low_v) * i / (speeds - 1)
         steps = steps_to_rest(v0, v, limits, safety)
         roll_speed(v0, v, limits, safety, lengths[:steps], ends[:steps])
-        near_gate = gate[6] + abs(v) * horizon_s + 1e-6
-        by_gate = gate[6] > 0.0 and math.hypot(gate[4] - pose[0], gate[5] - pose[1]) <= near_gate
+        near_gate = gate[3] + abs(v) * horizon_s + 1e-6
+        by_gate = gate[3] > 0.0 and math.hypot(gate[1] - pose[0], gate[2] - pose[1]) <= near_gate
         for j in range(turns):
             w = low_w + (high_w - low_w) * j / (turns - 1)
             bar = moves if v > 1e-3 else best
@@ -128,18 +127,18 @@ def choose(
             mx, my, heading = pose[0] + cp * x - sp * y, pose[1] + sp * x + cp * y, wrap(pose[2] + theta)
             # The field is followed by a point to the left.
             qx, qy = mx - lane_m * math.sin(heading), my + lane_m * math.cos(heading)
-            cost = value_at(qx, qy, time, x0, y0, spacing, 2.0)
+            cost = value_at(qx, qy, field, 2.0)
             if not cost < np.inf:
-                cost = value_at(mx, my, time, x0, y0, spacing, 2.0) + 2.0
+                cost = value_at(mx, my, field, 2.0) + 2.0
                 if not cost < np.inf:
                     continue
             if not by_gate and cost > bar:
                 continue
-            dx, dy = descent(qx, qy, time, x0, y0, spacing)
+            dx, dy = descent(qx, qy, field)
             if dx != 0.0 or dy != 0.0:
                 cost += heading_cost * abs(wrap(math.atan2(dy, dx) - heading))
-            if gate[6] > 0.0:
-                cost += gate[7]
+            if gate[3] > 0.0:
+                cost += gate[4]
             if by_gate:
                 cost = min(cost, through(v, w, pose, gate, lane_m, window, min(cost, bar)))
             if cost > bar:
@@ -201,7 +200,7 @@ def through(
     By the place on it, from the gate on, that is best for its time: nobody need follow the arc any farther.
     What is more than ``most`` may come out as infinite.
     """
-    time, x0, y0, spacing, gate_x, gate_y, near_m, _ = gate
+    field, gate_x, gate_y, near_m, _ = gate
     horizon_s, heading_cost = window[0], window[1]
     best, is_through = np.inf, False
     cp, sp = math.cos(pose[2]), math.sin(pose[2])
@@ -213,10 +212,10 @@ def through(
         if not is_through:
             continue
         qx, qy = mx - lane_m * math.sin(heading), my + lane_m * math.cos(heading)
-        cost = value_at(qx, qy, time, x0, y0, spacing, 2.0)
+        cost = value_at(qx, qy, field, 2.0)
         if cost + t - horizon_s > min(most, best):
             continue  # the heading only adds to it
-        dx, dy = descent(qx, qy, time, x0, y0, spacing)
+        dx, dy = descent(qx, qy, field)
         if dx != 0.0 or dy != 0.0:
             cost += heading_cost * abs(wrap(math.atan2(dy, dx) - heading))
         best = min(best, cost + t - horizon_s)
@@ -241,8 +240,7 @@ def free_turn(
         As ``choose``.
     """
     near, strange, people = seen
-    time, x0, y0, spacing = field
-    here = value_at(pose[0], pose[1], time, x0, y0, spacing, 0.0)
+    here = value_at(pose[0], pose[1], field, 0.0)
     v = limits[1] * limits[5]
     turned = pose.copy()
     best, best_turn = np.inf, np.inf
@@ -252,7 +250,7 @@ def free_turn(
             turn = wrap(2.0 * math.pi * k / HEADINGS)
             turned[2] = wrap(pose[2] + turn)
             x, y = pose[0] + ahead_m * math.cos(turned[2]), pose[1] + ahead_m * math.sin(turned[2])
-            cost = value_at(x, y, time, x0, y0, spacing, 2.0)
+            cost = value_at(x, y, field, 2.0)
             if not cost < here - gain_s or not cost + heading_cost * abs(turn) < best:
                 continue
             ahead = rotated(near, -turn), rotated(strange, -turn), rotated(people, -turn)

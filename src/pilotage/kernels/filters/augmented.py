@@ -16,7 +16,7 @@ from pilotage.kernels.filters.sighting import (
     landmark_index,
     range_bearing,
 )
-from pilotage.kernels.geometry.motion import arc_jacobians, exact_arc, mid_angle, wrap
+from pilotage.kernels.geometry.motion import arc_jacobians, moved, wrap
 from pilotage.kernels.jit import kernel
 
 POSE = 3
@@ -31,6 +31,16 @@ def true_increment(state: FloatArray, distance: float, angle: float, dt: float) 
     The reading is distance = scale_d d + noise, angle = scale_a a + bias dt + noise.
     """
     return distance / state[DISTANCE_SCALE], (angle - state[ANGLE_BIAS] * dt) / state[ANGLE_SCALE]
+
+
+@kernel
+def spread(cov: FloatArray, F: FloatArray, G: FloatArray, Q: FloatArray) -> None:
+    """P <- F P F' + G Q G' in place, with G (3, 2) in the pose; symmetric to the last bit."""
+    grown = F @ cov @ F.T
+    grown[:POSE, :POSE] += G @ Q @ G.T
+    for i in range(STATES):
+        for j in range(STATES):
+            cov[i, j] = 0.5 * (grown[i, j] + grown[j, i])
 
 
 @kernel
@@ -52,10 +62,7 @@ def predict(
     d, a = true_increment(state, distance, angle, dt)
     pose_jacobian, G = np.empty((POSE, POSE)), np.empty((POSE, 2))
     arc_jacobians(state[2], d, a, exact, pose_jacobian, G)
-    if exact:
-        state[0], state[1], state[2] = exact_arc(state[0], state[1], state[2], d, a)
-    else:
-        state[0], state[1], state[2] = mid_angle(state[0], state[1], state[2], d, a)
+    state[0], state[1], state[2] = moved(state[0], state[1], state[2], d, a, exact)
     # Slopes of the true increment: by the errors, and by the reading's noise.
     by_distance_scale = -d / state[DISTANCE_SCALE]
     by_angle_scale = -a / state[ANGLE_SCALE]
@@ -68,11 +75,7 @@ def predict(
         F[i, ANGLE_BIAS] = G[i, 1] * by_bias
         G[i, 0] /= state[DISTANCE_SCALE]
         G[i, 1] /= state[ANGLE_SCALE]
-    moved = F @ cov @ F.T
-    moved[:POSE, :POSE] += G @ Q @ G.T
-    for i in range(STATES):
-        for j in range(STATES):
-            cov[i, j] = 0.5 * (moved[i, j] + moved[j, i])
+    spread(cov, F, G, Q)
     for k in range(walk.shape[0]):
         cov[POSE + k, POSE + k] += walk[k] * dt
 

@@ -16,8 +16,11 @@ from pilotage.kernels.filters.sighting import (
     landmark_index,
     range_bearing,
 )
-from pilotage.kernels.geometry.motion import arc_jacobians, exact_arc, mid_angle, sideways, wrap
+from pilotage.kernels.geometry.motion import arc_jacobians, moved, sideways, wrap
 from pilotage.kernels.jit import kernel
+
+CONVERGED = 1e-9
+"""An update that moves the pose by less, in metres and radians, has settled."""
 
 
 @kernel
@@ -31,10 +34,7 @@ def predict(
     scratch = np.empty((3, 8))  # one allocation for all three: they would cost more than the arithmetic
     F, G, FP = scratch[:, 0:3], scratch[:, 3:5], scratch[:, 5:8]
     arc_jacobians(pose[2], distance, angle, exact, F, G)
-    if exact:
-        pose[0], pose[1], pose[2] = exact_arc(pose[0], pose[1], pose[2], distance, angle)
-    else:
-        pose[0], pose[1], pose[2] = mid_angle(pose[0], pose[1], pose[2], distance, angle)
+    pose[0], pose[1], pose[2] = moved(pose[0], pose[1], pose[2], distance, angle, exact)
     for i in range(3):
         for j in range(3):
             FP[i, j] = F[i, 0] * cov[0, j] + F[i, 1] * cov[1, j] + F[i, 2] * cov[2, j]
@@ -156,9 +156,25 @@ def update_range_bearings(
     Returns how many were used, and of each its NIS (K,) and outcome (K,): accepted, gated, unknown id.
     One after the other equals jointly for a linear measurement, and re-linearizes in between otherwise.
     """
+    return iterated_update(pose, cov, seen, known, mount, R, gate, 0)
+
+
+@kernel
+def iterated_update(
+    pose: FloatArray,
+    cov: FloatArray,
+    seen: Seen,
+    known: Known,
+    mount: FloatArray,
+    R: FloatArray,
+    gate: float,
+    iterations: int,
+) -> tuple[int, FloatArray, IntArray]:
+    """The same, each landmark linearized anew at its own outcome, up to so many times."""
     z, innovation, H = np.empty(2), np.empty(2), np.empty((2, 3))
     count, used = seen.ids.shape[0], 0
     nis, outcome = np.empty(count), np.empty(count, np.int64)
+    prior, prior_cov = np.empty(3), np.empty((3, 3))
     for k in range(count):
         nis[k] = math.nan
         outcome[k] = OUTCOME_UNKNOWN
@@ -169,7 +185,23 @@ def update_range_bearings(
         if not range_bearing(pose, mx, my, mount, z, H):
             continue
         innovation[0], innovation[1] = seen.ranges[k] - z[0], wrap(seen.bearings[k] - z[1])
+        if iterations > 0:
+            prior[:], prior_cov[:, :] = pose, cov
         nis[k] = joseph_update2(pose, cov, H, innovation, R, gate)
         outcome[k] = OUTCOME_ACCEPTED if nis[k] <= gate else OUTCOME_GATED
         used += outcome[k]
+        for _ in range(iterations if outcome[k] == OUTCOME_ACCEPTED else 0):
+            last = pose.copy()
+            if not range_bearing(last, mx, my, mount, z, H):
+                break
+            # The innovation seen from the prior: z less the prediction, less the slope times the way back.
+            d0, d1, d2 = prior[0] - last[0], prior[1] - last[1], wrap(prior[2] - last[2])
+            innovation[0] = seen.ranges[k] - z[0] - (H[0, 0] * d0 + H[0, 1] * d1 + H[0, 2] * d2)
+            innovation[1] = wrap(seen.bearings[k] - z[1] - (H[1, 0] * d0 + H[1, 1] * d1 + H[1, 2] * d2))
+            pose[:] = prior
+            cov[:, :] = prior_cov
+            joseph_update2(pose, cov, H, innovation, R, math.inf)
+            settled = abs(pose[0] - last[0]) + abs(pose[1] - last[1]) + abs(wrap(pose[2] - last[2]))
+            if settled < CONVERGED:
+                break
     return used, nis, outcome

@@ -6,12 +6,12 @@ import math
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pilotage.kernels.arrays import FloatArray, IntArray
-from pilotage.kernels.geometry.motion import exact_arc, mid_angle, sideways, wrap
+from pilotage.kernels.geometry.motion import moved, sideways, wrap
 from pilotage.kernels.geometry.nearest import (
     SEVERAL,
+    NearestGrid,
     distances_by_node,
     distances_to_item,
     item_throughout,
@@ -64,10 +64,7 @@ def sample_motion(
     for i in range(poses.shape[0]):
         d = distance + distance_std * normals[i, 0]
         a = angle + angle_std * normals[i, 1]
-        if exact:
-            poses[i, 0], poses[i, 1], poses[i, 2] = exact_arc(poses[i, 0], poses[i, 1], poses[i, 2], d, a)
-        else:
-            poses[i, 0], poses[i, 1], poses[i, 2] = mid_angle(poses[i, 0], poses[i, 1], poses[i, 2], d, a)
+        poses[i, 0], poses[i, 1], poses[i, 2] = moved(poses[i, 0], poses[i, 1], poses[i, 2], d, a, exact)
 
 
 @kernel
@@ -84,29 +81,21 @@ def sample_sideways(
 
 @kernel
 def log_likelihoods(
-    poses: FloatArray,
-    points: FloatArray,
-    nearest: NDArray[np.int32],
-    x0: float,
-    y0: float,
-    resolution: float,
-    items: FloatArray,
-    table: FloatArray,
-    table_step: float,
-    out: FloatArray,
-) -> None:
+    poses: FloatArray, points: FloatArray, grid: NearestGrid, table: FloatArray, table_step: float
+) -> FloatArray:
     """Log-likelihood (N,) of a scan's end points (B, 2), in the base frame, at particles (N, 3).
 
     The likelihood field of Thrun et al. 2005, table 6.3: the distance from each end point to the nearest
     obstacle. ``table`` holds the logarithm of a beam's density at multiples of ``table_step``; its last
     entry stands for all beyond and for what is off the map.
     """
+    nearest, x0, y0, resolution, items = grid
     last, count = table.shape[0] - 1, poses.shape[0]
+    out = np.zeros(count)
     px, py, c, s = poses[:, 0].copy(), poses[:, 1].copy(), np.empty(count), np.empty(count)
     x, y = np.empty(count), np.empty(count)
     for i in range(count):
         c[i], s[i] = math.cos(poses[i, 2]), math.sin(poses[i, 2])
-        out[i] = 0.0
     of_x, of_y, of_c, of_s = span(px), span(py), span(c), span(s)
     per_step = 1.0 / table_step
     # Beam by beam for all particles: what is alike for many is computed for several at once.
@@ -126,6 +115,7 @@ def log_likelihoods(
         for i in range(count):
             entry = away[i] * per_step + 0.5
             out[i] += table[np.uint64(entry if entry < last else last)]
+    return out
 
 
 @kernel

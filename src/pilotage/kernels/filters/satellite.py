@@ -12,8 +12,8 @@ import math
 import numpy as np
 
 from pilotage.kernels.arrays import FloatArray
-from pilotage.kernels.filters.augmented import POSE, STATES, joseph_update
-from pilotage.kernels.geometry.motion import arc_jacobians, exact_arc, mid_angle, wrap
+from pilotage.kernels.filters.augmented import POSE, STATES, joseph_update, spread
+from pilotage.kernels.geometry.motion import arc_jacobians, moved, wrap
 from pilotage.kernels.jit import kernel
 
 OFFSET_X, OFFSET_Y, DECLINATION, DISTURBANCE = 3, 4, 5, 6
@@ -26,17 +26,10 @@ def predict(
     """Move the pose in ``state`` (7,) and ``cov`` (7, 7) in place by an odometry reading of covariance Q."""
     jacobian, G = np.empty((POSE, POSE)), np.empty((POSE, 2))
     arc_jacobians(state[2], distance, angle, exact, jacobian, G)
-    if exact:
-        state[0], state[1], state[2] = exact_arc(state[0], state[1], state[2], distance, angle)
-    else:
-        state[0], state[1], state[2] = mid_angle(state[0], state[1], state[2], distance, angle)
+    state[0], state[1], state[2] = moved(state[0], state[1], state[2], distance, angle, exact)
     F = np.eye(STATES)
     F[:POSE, :POSE] = jacobian
-    moved = F @ cov @ F.T
-    moved[:POSE, :POSE] += G @ Q @ G.T
-    for i in range(STATES):
-        for j in range(STATES):
-            cov[i, j] = 0.5 * (moved[i, j] + moved[j, i])
+    spread(cov, F, G, Q)
 
 
 @kernel

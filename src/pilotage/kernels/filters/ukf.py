@@ -20,7 +20,7 @@ from pilotage.kernels.filters.sighting import (
     landmark_index,
     range_bearing,
 )
-from pilotage.kernels.geometry.motion import exact_arc, mid_angle, wrap
+from pilotage.kernels.geometry.motion import moved, wrap
 from pilotage.kernels.jit import kernel
 
 ALPHA = 0.1
@@ -88,25 +88,22 @@ def predict(
     wm, wc = np.empty(11), np.empty(11)
     if not sigma_points(mean, full, points, wm, wc):
         return
-    moved = np.empty((11, 3))
+    ends = np.empty((11, 3))
     for i in range(11):
         x, y, theta, d, a = points[i, 0], points[i, 1], points[i, 2], points[i, 3], points[i, 4]
-        if exact:
-            moved[i, 0], moved[i, 1], moved[i, 2] = exact_arc(x, y, theta, d, a)
-        else:
-            moved[i, 0], moved[i, 1], moved[i, 2] = mid_angle(x, y, theta, d, a)
+        ends[i, 0], ends[i, 1], ends[i, 2] = moved(x, y, theta, d, a, exact)
     # Headings relative to the middle point's: on the circle, averaged without a seam.
-    middle = moved[0, 2]
+    middle = ends[0, 2]
     for i in range(11):
-        moved[i, 2] = wrap(moved[i, 2] - middle)
+        ends[i, 2] = wrap(ends[i, 2] - middle)
     average = np.zeros(3)
     for i in range(11):
-        average += wm[i] * moved[i]
+        average += wm[i] * ends[i]
     cov[:, :] = 0.0
     for i in range(11):
         for a_ in range(3):
             for b in range(3):
-                cov[a_, b] += wc[i] * (moved[i, a_] - average[a_]) * (moved[i, b] - average[b])
+                cov[a_, b] += wc[i] * (ends[i, a_] - average[a_]) * (ends[i, b] - average[b])
     pose[0], pose[1] = average[0], average[1]
     pose[2] = wrap(average[2] + middle)
 

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from typing import TypeAlias
 
 import numpy as np
 
 from pilotage.kernels.arrays import FloatArray
 from pilotage.kernels.jit import kernel
 
+Field: TypeAlias = tuple[FloatArray, float, float, float]
+"""Values at the nodes (rows, columns) of a grid, x and y of node (0, 0), and the spacing of the nodes."""
 BLOCK, REGION = 16, 128
 """Nodes on a side of the blocks whose far-away geometry is passed over as a whole, and of regions of them."""
 
@@ -176,10 +179,9 @@ def interpolate_at(
 
 
 @kernel
-def interpolate(
-    points: FloatArray, distance: FloatArray, x0: float, y0: float, resolution: float
-) -> FloatArray:
+def interpolate(points: FloatArray, field: Field) -> FloatArray:
     """``interpolate_at`` for points (K, 2); returns (K,)."""
+    distance, x0, y0, resolution = field
     out = np.empty(points.shape[0])
     for k in range(points.shape[0]):
         out[k] = interpolate_at(points[k, 0], points[k, 1], distance, x0, y0, resolution)

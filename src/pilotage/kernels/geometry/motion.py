@@ -69,6 +69,16 @@ def mid_angle(x: float, y: float, theta: float, distance: float, angle: float) -
 
 
 @kernel
+def moved(
+    x: float, y: float, theta: float, distance: float, angle: float, exact: bool
+) -> tuple[float, float, float]:
+    """``exact_arc`` or ``mid_angle``."""
+    if exact:
+        return exact_arc(x, y, theta, distance, angle)
+    return mid_angle(x, y, theta, distance, angle)
+
+
+@kernel
 def sideways(theta: float, lateral: float, angle: float, exact: bool) -> tuple[float, float]:
     """How far x and y go besides, of a base that drives ``lateral`` to its left along an arc.
 

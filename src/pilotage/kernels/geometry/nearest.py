@@ -16,6 +16,9 @@ from pilotage.kernels.jit import kernel
 IndexArray = NDArray[np.int32]
 Box: TypeAlias = tuple[float, float, float, float]
 """Least and largest x, least and largest y."""
+NearestGrid: TypeAlias = tuple[IndexArray, float, float, float, FloatArray]
+"""Index (rows, columns) of the item nearest to each node, x and y of node (0, 0), the nodes' spacing, and the
+items (N, 5)."""
 LEAST = 1e-300
 """In place of a squared length of 0: a segment without one is a point."""
 SEVERAL = -1

@@ -17,7 +17,7 @@ from pilotage.kernels.arrays import FloatArray, IntArray
 from pilotage.kernels.geometry.field import interpolate_at
 from pilotage.kernels.geometry.plane import point_segment_distance
 from pilotage.kernels.jit import kernel
-from pilotage.kernels.rrt.dubins import TURNS, advance
+from pilotage.kernels.rrt.dubins import TURNS, Curve, advance
 
 ROUNDING_M = 1e-9
 """A state may be this much nearer than the clearance: paths touch the clearance's edge by construction."""
@@ -228,56 +228,33 @@ def slacks_at(points: FloatArray, space: Space, clearance: float) -> FloatArray:
 
 
 @kernel
-def curve_is_free(
-    x0: float,
-    y0: float,
-    th0: float,
-    radius: float,
-    word: int,
-    l0: float,
-    l1: float,
-    l2: float,
-    space: Space,
-    clearance: float,
-    min_step: float,
-) -> bool:
+def curve_is_free(curve: Curve, space: Space, clearance: float, min_step: float) -> bool:
     """Whether a Dubins curve keeps the clearance.
 
     From each state the check moves on by its slack, but at least by ``min_step``: between such states
     the curve may come nearer by about ``min_step ** 2 / 8 * (1 / clearance + 1 / radius)``.
     """
-    slack = slack_at(x0, y0, space, clearance)
+    x, y, th = curve.x, curve.y, curve.th
+    slack = slack_at(x, y, space, clearance)
     if slack < 0.0:
         return False
-    x, y, th = x0, y0, th0
     for piece in range(3):
-        length = l0 if piece == 0 else (l1 if piece == 1 else l2)
-        turn = TURNS[word, piece]
+        length = curve.l0 if piece == 0 else (curve.l1 if piece == 1 else curve.l2)
+        turn = TURNS[curve.word, piece]
         s = 0.0
         while s < length:
             s = min(length, s + max(min_step, slack))
-            px, py, _ = advance(x, y, th, turn, radius, s)
+            px, py, _ = advance(x, y, th, turn, curve.radius, s)
             slack = slack_at(px, py, space, clearance)
             if slack < 0.0:
                 return False
         if length > 0.0:
-            x, y, th = advance(x, y, th, turn, radius, length)
+            x, y, th = advance(x, y, th, turn, curve.radius, length)
     return True
 
 
 @kernel
-def middle_is_blocked(
-    x0: float,
-    y0: float,
-    th0: float,
-    radius: float,
-    word: int,
-    l0: float,
-    l1: float,
-    space: Space,
-    clearance: float,
-    min_step: float,
-) -> bool:
+def middle_is_blocked(curve: Curve, space: Space, clearance: float, min_step: float) -> bool:
     """Whether the field's nodes along a Dubins curve's straight piece tell that ``curve_is_free`` denies it.
 
     A point is no farther from the geometry than a node is, plus the way to that node. Between two states
@@ -285,9 +262,10 @@ def middle_is_blocked(
     is nearer by more is between no such two. One node is looked up for each half clearance: a fraction of
     what the check costs, and most long curves are blocked. False proves nothing.
     """
-    if TURNS[word, 1] != 0 or not space.margin > 0.0:
+    if TURNS[curve.word, 1] != 0 or not space.margin > 0.0:
         return False
-    x, y, th = advance(x0, y0, th0, TURNS[word, 0], radius, l0)
+    x, y, th = advance(curve.x, curve.y, curve.th, TURNS[curve.word, 0], curve.radius, curve.l0)
+    l1 = curve.l1
     count = int(2.0 * l1 / clearance) + 1
     u, v = (x - space.x0) / space.resolution, (y - space.y0) / space.resolution
     du, dv = l1 * math.cos(th) / (count * space.resolution), l1 * math.sin(th) / (count * space.resolution)

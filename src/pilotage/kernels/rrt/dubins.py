@@ -14,6 +14,7 @@ Boissonnat, Soueres and Laumond 1994, ICRA, pp. 2-7): a word whose last piece is
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,6 +29,25 @@ TURNS = np.array([[1, 0, 1], [1, 0, -1], [-1, 0, 1], [-1, 0, -1], [-1, 1, -1], [
 TWO_PI = 2.0 * math.pi
 SNAP_RAD = 1e-9
 """A turn that lacks less than this from a full circle is no turn: rounding must not cost a loop."""
+
+
+class Curve(NamedTuple):
+    """From which pose and how tightly it bends; its word, and the lengths of that word's pieces in metres."""
+
+    x: float
+    y: float
+    th: float
+    radius: float
+    word: int
+    l0: float
+    l1: float
+    l2: float
+
+
+@kernel
+def length_of(curve: Curve) -> float:
+    """Of all three pieces."""
+    return curve.l0 + curve.l1 + curve.l2
 
 
 @kernel
@@ -91,10 +111,8 @@ def word_lengths(
 
 
 @kernel
-def shortest(
-    x0: float, y0: float, th0: float, x1: float, y1: float, th1: float, radius: float
-) -> tuple[int, float, float, float]:
-    """Word and lengths in metres of the shortest Dubins curve from pose 0 to pose 1.
+def shortest(x0: float, y0: float, th0: float, x1: float, y1: float, th1: float, radius: float) -> Curve:
+    """The shortest Dubins curve from pose 0 to pose 1.
 
     At equal lengths the first word in the order of ``WORD_NAMES`` wins. Poses that differ by less than
     about ``SNAP_RAD`` turning radii are the same pose.
@@ -108,14 +126,12 @@ def shortest(
         if a + b + c < best:
             best_word, best = word, a + b + c
             best0, best1, best2 = a, b, c
-    return best_word, best0, best1, best2
+    return Curve(x0, y0, th0, radius, best_word, best0, best1, best2)
 
 
 @kernel
-def shortest_to_point(
-    x0: float, y0: float, th0: float, x1: float, y1: float, radius: float
-) -> tuple[int, float, float, float]:
-    """Word and lengths of the shortest curve from a pose to a point reached with any heading.
+def shortest_to_point(x0: float, y0: float, th0: float, x1: float, y1: float, radius: float) -> Curve:
+    """The shortest curve from a pose to a point reached with any heading.
 
     An arc and its tangent through the point, or, for a point inside a turning circle, two arcs; the
     third piece is empty.
@@ -147,7 +163,17 @@ def shortest_to_point(
                 arc1 = radius * _turn(side * (leave - arrive))
                 if arc0 + arc1 < best:
                     best_word, best, best0, best1 = (LRL if side > 0 else RLR), arc0 + arc1, arc0, arc1
-    return best_word, best0, best1, 0.0
+    return Curve(x0, y0, th0, radius, best_word, best0, best1, 0.0)
+
+
+@kernel
+def connect(
+    x0: float, y0: float, th0: float, x1: float, y1: float, th1: float, free: bool, radius: float
+) -> Curve:
+    """The shortest curve from pose 0 to pose 1, or to the point where its heading is free."""
+    if free:
+        return shortest_to_point(x0, y0, th0, x1, y1, radius)
+    return shortest(x0, y0, th0, x1, y1, th1, radius)
 
 
 @kernel
@@ -166,25 +192,15 @@ def advance(
 
 
 @kernel
-def pose_at(
-    x0: float,
-    y0: float,
-    th0: float,
-    radius: float,
-    word: int,
-    l0: float,
-    l1: float,
-    l2: float,
-    s: float,
-) -> tuple[float, float, float]:
+def pose_at(curve: Curve, s: float) -> tuple[float, float, float]:
     """Pose at arc length ``s`` along a curve, its heading in [-pi, pi)."""
-    x, y, th = x0, y0, th0
+    x, y, th = curve.x, curve.y, curve.th
     left = s
     for piece in range(3):
-        length = l0 if piece == 0 else (l1 if piece == 1 else l2)
+        length = curve.l0 if piece == 0 else (curve.l1 if piece == 1 else curve.l2)
         part = min(left, length)
         if part > 0.0:
-            x, y, th = advance(x, y, th, TURNS[word, piece], radius, part)
+            x, y, th = advance(x, y, th, TURNS[curve.word, piece], curve.radius, part)
             left -= part
     th = th - TWO_PI * math.floor((th + math.pi) / TWO_PI)
     if th >= math.pi:
@@ -193,22 +209,12 @@ def pose_at(
 
 
 @kernel
-def sample(
-    x0: float,
-    y0: float,
-    th0: float,
-    radius: float,
-    word: int,
-    l0: float,
-    l1: float,
-    l2: float,
-    spacing: float,
-) -> FloatArray:
+def sample(curve: Curve, spacing: float) -> FloatArray:
     """States (N, 3) x, y, theta evenly along a curve, at most ``spacing`` apart, with both its ends."""
-    total = l0 + l1 + l2
+    total = length_of(curve)
     count = max(1, math.ceil(total / spacing - 1e-9))
     out = np.empty((count + 1, 3))
     for i in range(count + 1):
         s = total if i == count else total * i / count
-        out[i, 0], out[i, 1], out[i, 2] = pose_at(x0, y0, th0, radius, word, l0, l1, l2, s)
+        out[i, 0], out[i, 1], out[i, 2] = pose_at(curve, s)
     return out

@@ -10,7 +10,7 @@ from pilotage.kernels.arrays import FloatArray
 from pilotage.kernels.geometry.motion import exact_arc, wrap
 from pilotage.kernels.geometry.plane import distance_to_nearest
 from pilotage.kernels.jit import kernel
-from pilotage.kernels.rrt.dubins import pose_at, shortest
+from pilotage.kernels.rrt.dubins import length_of, pose_at, shortest
 
 
 @kernel
@@ -31,8 +31,8 @@ def stepped_curve(
     Without ``to_the_end`` the last piece, shorter than a step, is left out, so that every piece is driven
     in the same time. Empty (0, 3) where the curve is longer than ``longest``.
     """
-    word, l0, l1, l2 = shortest(x0, y0, th0, x1, y1, th1, radius)
-    length = l0 + l1 + l2
+    curve = shortest(x0, y0, th0, x1, y1, th1, radius)
+    length = length_of(curve)
     if not length <= longest:
         return np.empty((0, 3))
     pieces = int(length / step + 1e-9)
@@ -40,7 +40,7 @@ def stepped_curve(
     count = pieces + 1 + (1 if to_the_end and rest else 0)
     states = np.empty((count, 3))
     for i in range(pieces + 1):
-        states[i, 0], states[i, 1], states[i, 2] = pose_at(x0, y0, th0, radius, word, l0, l1, l2, i * step)
+        states[i, 0], states[i, 1], states[i, 2] = pose_at(curve, i * step)
     if count > pieces + 1:
         states[count - 1, 0], states[count - 1, 1], states[count - 1, 2] = x1, y1, th1
     return states

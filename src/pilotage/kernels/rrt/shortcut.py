@@ -13,8 +13,8 @@ import numpy as np
 
 from pilotage.kernels.arrays import BoolArray, FloatArray, IntArray
 from pilotage.kernels.jit import kernel
-from pilotage.kernels.rrt import dubins
 from pilotage.kernels.rrt.clearance import Space, curve_is_free, middle_is_blocked, slack_at
+from pilotage.kernels.rrt.dubins import Curve, connect, length_of, pose_at, shortest
 
 PATTERN = np.array(
     [
@@ -49,16 +49,6 @@ class Rules(NamedTuple):
 
 
 @kernel
-def connect(
-    ax: float, ay: float, ath: float, bx: float, by: float, bth: float, free: bool, radius: float
-) -> tuple[int, float, float, float]:
-    """Shortest curve from pose a to pose b, or to the point b where its heading is free."""
-    if free:
-        return dubins.shortest_to_point(ax, ay, ath, bx, by, radius)
-    return dubins.shortest(ax, ay, ath, bx, by, bth, radius)
-
-
-@kernel
 def arc_lengths(states: FloatArray, radius: float) -> FloatArray:
     """Arc length (N,) at each of the states (N, 3) of a path made of Dubins curves, from its beginning."""
     out = np.zeros(states.shape[0])
@@ -66,18 +56,24 @@ def arc_lengths(states: FloatArray, radius: float) -> FloatArray:
         ax, ay, ath = states[i - 1, 0], states[i - 1, 1], states[i - 1, 2]
         bx, by, bth = states[i, 0], states[i, 1], states[i, 2]
         chord = math.hypot(bx - ax, by - ay)
-        _, l0, l1, l2 = dubins.shortest(ax, ay, ath, bx, by, bth, radius)
-        length = l0 + l1 + l2
+        length = length_of(shortest(ax, ay, ath, bx, by, bth, radius))
         # Where rounding, or turning on the spot, asks for a loop there is none.
         out[i] = out[i - 1] + (length if length <= 1.2 * chord + 2.0 * radius else chord)
     return out
 
 
 @kernel
-def _is_free(
-    x: float, y: float, th: float, word: int, l0: float, l1: float, l2: float, space: Space, rules: Rules
-) -> bool:
-    return curve_is_free(x, y, th, rules.radius, word, l0, l1, l2, space, rules.clearance, rules.min_step)
+def _is_free(curve: Curve, space: Space, rules: Rules) -> bool:
+    return curve_is_free(curve, space, rules.clearance, rules.min_step)
+
+
+@kernel
+def _to_next(path: FloatArray, i: int, rules: Rules) -> Curve:
+    """From a waypoint (of K, 3) to the next, which at the goal may be met with any heading."""
+    free = rules.goal_heading_free and i == path.shape[0] - 2
+    return connect(
+        path[i, 0], path[i, 1], path[i, 2], path[i + 1, 0], path[i + 1, 1], path[i + 1, 2], free, rules.radius
+    )
 
 
 @kernel
@@ -110,15 +106,11 @@ def best_chain(samples: FloatArray, s: FloatArray, space: Space, rules: Rules) -
             if cost[i] + math.hypot(x - samples[i, 0], y - samples[i, 1]) >= best - 1e-9:
                 continue
             px, py, pth = samples[i, 0], samples[i, 1], samples[i, 2]
-            word, l0, l1, l2 = connect(px, py, pth, x, y, th, free, rules.radius)
-            reached = cost[i] + l0 + l1 + l2
-            if reached >= best - 1e-9:
+            curve = connect(px, py, pth, x, y, th, free, rules.radius)
+            reached = cost[i] + curve.l0 + curve.l1 + curve.l2
+            if reached >= best - 1e-9 or middle_is_blocked(curve, space, rules.clearance, rules.min_step):
                 continue
-            if middle_is_blocked(
-                px, py, pth, rules.radius, word, l0, l1, space, rules.clearance, rules.min_step
-            ):
-                continue
-            if _is_free(px, py, pth, word, l0, l1, l2, space, rules):
+            if _is_free(curve, space, rules):
                 best = reached
                 before[j], own[j] = i, False
         cost[j] = best
@@ -152,18 +144,7 @@ def tighten(
     length = np.zeros(k)
     for i in range(k - 1):
         if not kept[i]:
-            free = rules.goal_heading_free and i == k - 2
-            _, l0, l1, l2 = connect(
-                path[i, 0],
-                path[i, 1],
-                path[i, 2],
-                path[i + 1, 0],
-                path[i + 1, 1],
-                path[i + 1, 2],
-                free,
-                rules.radius,
-            )
-            length[i] = l0 + l1 + l2
+            length[i] = length_of(_to_next(path, i, rules))
     for _ in range(200):
         active = False
         for i in range(1, k - 1):
@@ -181,20 +162,16 @@ def tighten(
                 ax, ay, ath = path[i - 1, 0], path[i - 1, 1], path[i - 1, 2]
                 if math.hypot(x - ax, y - ay) + math.hypot(path[i + 1, 0] - x, path[i + 1, 1] - y) >= old:
                     continue
-                w0, a0, a1, a2 = dubins.shortest(ax, ay, ath, x, y, th, rules.radius)
-                if a0 + a1 + a2 >= old:
+                to = shortest(ax, ay, ath, x, y, th, rules.radius)
+                if length_of(to) >= old:
                     continue
-                w1, b0, b1, b2 = connect(
-                    x, y, th, path[i + 1, 0], path[i + 1, 1], path[i + 1, 2], free, rules.radius
-                )
-                if a0 + a1 + a2 + b0 + b1 + b2 >= old:
+                on = connect(x, y, th, path[i + 1, 0], path[i + 1, 1], path[i + 1, 2], free, rules.radius)
+                if length_of(to) + on.l0 + on.l1 + on.l2 >= old:
                     continue
-                if not _is_free(ax, ay, ath, w0, a0, a1, a2, space, rules):
-                    continue
-                if not _is_free(x, y, th, w1, b0, b1, b2, space, rules):
+                if not _is_free(to, space, rules) or not _is_free(on, space, rules):
                     continue
                 path[i, 0], path[i, 1], path[i, 2] = x, y, th
-                length[i - 1], length[i] = a0 + a1 + a2, b0 + b1 + b2
+                length[i - 1], length[i] = length_of(to), length_of(on)
                 moved = True
             if not moved:
                 step[i] *= 0.5
@@ -228,30 +205,18 @@ def split(
         n += 1
         if kept[i]:
             continue
-        free = rules.goal_heading_free and i == k - 2
-        word, l0, l1, l2 = connect(
-            path[i, 0],
-            path[i, 1],
-            path[i, 2],
-            path[i + 1, 0],
-            path[i + 1, 1],
-            path[i + 1, 2],
-            free,
-            rules.radius,
-        )
-        total = l0 + l1 + l2
+        curve = _to_next(path, i, rules)
+        total = length_of(curve)
         if total < 4.0 * spacing:
             continue
         best, at, s = math.inf, -1.0, spacing
         while s <= total - spacing:
-            x, y, _ = dubins.pose_at(path[i, 0], path[i, 1], path[i, 2], rules.radius, word, l0, l1, l2, s)
+            x, y, _ = pose_at(curve, s)
             slack = slack_at(x, y, space, rules.clearance)
             if slack < best:
                 best, at = slack, s
             s += 0.25 * spacing
-        out[n, 0], out[n, 1], out[n, 2] = dubins.pose_at(
-            path[i, 0], path[i, 1], path[i, 2], rules.radius, word, l0, l1, l2, at
-        )
+        out[n, 0], out[n, 1], out[n, 2] = pose_at(curve, at)
         was[n] = i
         n += 1
     out[n] = path[k - 1]

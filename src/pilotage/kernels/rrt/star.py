@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from pilotage.kernels.arrays import FloatArray
 from pilotage.kernels.jit import kernel
-from pilotage.kernels.rrt import dubins
 from pilotage.kernels.rrt.clearance import Space, curve_is_free, slack_at
+from pilotage.kernels.rrt.dubins import Curve, connect, length_of, pose_at
 from pilotage.kernels.rrt.samples import Bound, Search, advance_guide, bound_at, draw, edge_ahead
 from pilotage.kernels.rrt.tree import (
     GOAL,
@@ -41,33 +41,14 @@ PATIENCE = 20.0
 
 
 @kernel
-def _curve(
-    tree: Tree, node: int, x: float, y: float, th: float, free: bool, radius: float
-) -> tuple[int, float, float, float]:
+def _curve(tree: Tree, node: int, x: float, y: float, th: float, free: bool, radius: float) -> Curve:
     """Shortest curve from a node to a pose, or to a point where the heading is open."""
-    px, py, pth = tree.pose[node, 0], tree.pose[node, 1], tree.pose[node, 2]
-    if free:
-        return dubins.shortest_to_point(px, py, pth, x, y, radius)
-    return dubins.shortest(px, py, pth, x, y, th, radius)
+    return connect(tree.pose[node, 0], tree.pose[node, 1], tree.pose[node, 2], x, y, th, free, radius)
 
 
 @kernel
-def _node_is_free_to(
-    tree: Tree, node: int, word: int, l0: float, l1: float, l2: float, space: Space, search: Search
-) -> bool:
-    return curve_is_free(
-        tree.pose[node, 0],
-        tree.pose[node, 1],
-        tree.pose[node, 2],
-        search.radius,
-        word,
-        l0,
-        l1,
-        l2,
-        space,
-        search.clearance,
-        search.min_step,
-    )
+def _is_free(curve: Curve, space: Space, search: Search) -> bool:
+    return curve_is_free(curve, space, search.clearance, search.min_step)
 
 
 @kernel
@@ -81,8 +62,8 @@ def try_goal(tree: Tree, node: int, space: Space, search: Search) -> bool:
     gx, gy, gth = tree.pose[GOAL, 0], tree.pose[GOAL, 1], tree.pose[GOAL, 2]
     if math.hypot(gx - tree.pose[node, 0], gy - tree.pose[node, 1]) > max(search.connection, search.radius):
         return False
-    word, l0, l1, l2 = _curve(tree, node, gx, gy, gth, search.goal_heading_free, search.radius)
-    total = l0 + l1 + l2
+    curve = _curve(tree, node, gx, gy, gth, search.goal_heading_free, search.radius)
+    total = length_of(curve)
     tree.counts[N_TRIES] += 1
     if total > search.connection + search.radius * tree.counts[N_TRIES] / PATIENCE:
         return False
@@ -92,9 +73,9 @@ def try_goal(tree: Tree, node: int, space: Space, search: Search) -> bool:
         tree.cost[node] + total >= tree.cost[GOAL] - 1e-9 or tree.counts[N_NODES] + edges > cap
     ):
         return False
-    if tree.counts[N_JOINS] >= cap or not _node_is_free_to(tree, node, word, l0, l1, l2, space, search):
+    if tree.counts[N_JOINS] >= cap or not _is_free(curve, space, search):
         return False
-    x, y, th = tree.pose[node, 0], tree.pose[node, 1], tree.pose[node, 2]
+    word, l0, l1 = curve.word, curve.l0, curve.l1
     for i in range(edges):
         s0, s1 = total * i / edges, total * (i + 1) / edges
         a = max(0.0, min(l0, s1) - max(0.0, s0))
@@ -108,9 +89,7 @@ def try_goal(tree: Tree, node: int, space: Space, search: Search) -> bool:
         else:
             new = tree.counts[N_NODES]
             tree.counts[N_NODES] += 1
-            tree.pose[new, 0], tree.pose[new, 1], tree.pose[new, 2] = dubins.pose_at(
-                x, y, th, search.radius, word, l0, l1, l2, s1
-            )
+            tree.pose[new, 0], tree.pose[new, 1], tree.pose[new, 2] = pose_at(curve, s1)
             attach(tree, new, node, word, a, b, c)
             put_in_bucket(tree, new)
             node = new
@@ -144,8 +123,7 @@ def grow(
     near = np.empty(MAX_NEAR, np.int64)
     away2 = np.empty(MAX_NEAR)
     cost = np.empty(MAX_NEAR)
-    words = np.empty(MAX_NEAR, np.int64)
-    lengths = np.empty((MAX_NEAR, 3))
+    words, lengths = np.empty(MAX_NEAR, np.int64), np.empty((MAX_NEAR, 3))
     capacity = tree.cost.shape[0]
     ahead = edge_ahead(guide, search.connection)
     for done in range(iterations):
@@ -159,9 +137,9 @@ def grow(
         found = nearest_anywhere(tree, x, y, near[:10], away2[:10])
         source, word, l0, l1, l2 = -1, 0, math.inf, 0.0, 0.0
         for i in range(found):
-            w, a, b, c = _curve(tree, near[i], x, y, th, free, search.radius)
-            if a + b + c < l0 + l1 + l2:
-                source, word, l0, l1, l2 = near[i], w, a, b, c
+            curve = _curve(tree, near[i], x, y, th, free, search.radius)
+            if length_of(curve) < l0 + l1 + l2:
+                source, word, l0, l1, l2 = near[i], curve.word, curve.l0, curve.l1, curve.l2
         total = l0 + l1 + l2
         if source < 0 or not total > 1e-6:
             continue
@@ -170,17 +148,8 @@ def grow(
             l1 = min(l1, search.connection - l0)
             l2 = search.connection - l0 - l1
             total = search.connection
-        x, y, th = dubins.pose_at(
-            tree.pose[source, 0],
-            tree.pose[source, 1],
-            tree.pose[source, 2],
-            search.radius,
-            word,
-            l0,
-            l1,
-            l2,
-            total,
-        )
+        px, py, pth = tree.pose[source, 0], tree.pose[source, 1], tree.pose[source, 2]
+        x, y, th = pose_at(Curve(px, py, pth, search.radius, word, l0, l1, l2), total)
         if slack_at(x, y, space, search.clearance) < 0.0:
             continue
         incumbent = tree.cost[GOAL]
@@ -199,12 +168,10 @@ def grow(
                 has_source = True
             if tree.cost[node] + math.sqrt(away2[i]) + left >= incumbent:
                 continue
-            words[i], lengths[i, 0], lengths[i, 1], lengths[i, 2] = _curve(
-                tree, node, x, y, th, False, search.radius
-            )
-            length = lengths[i, 0] + lengths[i, 1] + lengths[i, 2]
-            if length <= search.connection:
-                cost[i] = tree.cost[node] + length
+            curve = _curve(tree, node, x, y, th, False, search.radius)
+            words[i], lengths[i, 0], lengths[i, 1], lengths[i, 2] = curve[4:]
+            if length_of(curve) <= search.connection:
+                cost[i] = tree.cost[node] + length_of(curve)
         candidates = found
         if not has_source:
             near[found] = source
@@ -219,16 +186,9 @@ def grow(
                     best = i
             if not cost[best] + left < incumbent:
                 break
-            if _node_is_free_to(
-                tree,
-                near[best],
-                words[best],
-                lengths[best, 0],
-                lengths[best, 1],
-                lengths[best, 2],
-                space,
-                search,
-            ):
+            px, py, pth = tree.pose[near[best], 0], tree.pose[near[best], 1], tree.pose[near[best], 2]
+            l0, l1, l2 = lengths[best, 0], lengths[best, 1], lengths[best, 2]
+            if _is_free(Curve(px, py, pth, search.radius, words[best], l0, l1, l2), space, search):
                 parent = best
                 break
             cost[best] = math.inf
@@ -237,9 +197,7 @@ def grow(
         new = tree.counts[N_NODES]
         tree.counts[N_NODES] += 1
         tree.pose[new, 0], tree.pose[new, 1], tree.pose[new, 2] = x, y, th
-        attach(
-            tree, new, near[parent], words[parent], lengths[parent, 0], lengths[parent, 1], lengths[parent, 2]
-        )
+        attach(tree, new, near[parent], words[parent], l0, l1, l2)
         rewired = _rewire(tree, new, near[:found], away2, space, search)
         put_in_bucket(tree, new)
         joined = try_goal(tree, new, space, search)
@@ -260,14 +218,13 @@ def _rewire(
         node = near[i]
         if node == START or tree.cost[new] + math.sqrt(away2[i]) >= tree.cost[node]:
             continue
-        word, l0, l1, l2 = _curve(
-            tree, new, tree.pose[node, 0], tree.pose[node, 1], tree.pose[node, 2], False, search.radius
-        )
-        length = l0 + l1 + l2
+        x, y, th = tree.pose[node, 0], tree.pose[node, 1], tree.pose[node, 2]
+        curve = _curve(tree, new, x, y, th, False, search.radius)
+        length = length_of(curve)
         if length > search.connection or tree.cost[new] + length >= tree.cost[node] - 1e-9:
             continue
         # Costs grow along branches, so a cheaper path to a node never leads through its own descendants.
-        if _node_is_free_to(tree, new, word, l0, l1, l2, space, search):
-            attach(tree, node, new, word, l0, l1, l2)
+        if _is_free(curve, space, search):
+            attach(tree, node, new, curve.word, curve.l0, curve.l1, curve.l2)
             changed = True
     return changed

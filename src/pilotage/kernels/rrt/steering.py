@@ -30,12 +30,14 @@ class Steering(NamedTuple):
 
 
 @kernel
-def _fill(word: FloatArray, name: int, l0: float, l1: float, l2: float, radius: float, sign: int) -> None:
+def _fill(word: FloatArray, curve: dubins.Curve, sign: int) -> None:
     """A Dubins curve as a word; ``sign`` -1: it is driven backwards, as seen in a mirror behind the car."""
     word[:, :] = 0.0
-    word[0, 1], word[1, 1], word[2, 1] = sign * l0 / radius, sign * l1 / radius, sign * l2 / radius
+    radius = curve.radius
+    word[0, 1], word[1, 1] = sign * curve.l0 / radius, sign * curve.l1 / radius
+    word[2, 1] = sign * curve.l2 / radius
     for piece in range(3):
-        word[piece, 0] = sign * dubins.TURNS[name, piece]
+        word[piece, 0] = sign * dubins.TURNS[curve.word, piece]
         if abs(word[piece, 1]) < NOTHING:
             word[piece, 1] = 0.0
 
@@ -46,10 +48,10 @@ def curve_between(
 ) -> tuple[FloatArray, float]:
     """The curve (5, 2) from pose 0 to pose 1, and its price."""
     if not steering.reverses:
-        name, l0, l1, l2 = dubins.shortest(x0, y0, th0, x1, y1, th1, steering.radius)
+        curve = dubins.shortest(x0, y0, th0, x1, y1, th1, steering.radius)
         word = np.empty((PIECES, 2))
-        _fill(word, name, l0, l1, l2, steering.radius, 1)
-        return word, l0 + l1 + l2
+        _fill(word, curve, 1)
+        return word, dubins.length_of(curve)
     word, cost = shortest(x0, y0, th0, x1, y1, th1, steering.radius, steering.reverse_cost)
     gear = 0.0
     for piece in range(PIECES):
@@ -69,14 +71,14 @@ def curve_to_point(
     """The curve from a pose to a point reached with any heading, without a change of direction; its price."""
     radius = steering.radius
     word = np.empty((PIECES, 2))
-    name, l0, l1, l2 = dubins.shortest_to_point(x0, y0, th0, x1, y1, radius)
-    price, sign = l0 + l1 + l2, 1
+    curve = dubins.shortest_to_point(x0, y0, th0, x1, y1, radius)
+    price, sign = dubins.length_of(curve), 1
     if steering.reverses:
-        back, b0, b1, b2 = dubins.shortest_to_point(x0, y0, th0 + math.pi, x1, y1, radius)
-        if steering.reverse_cost * (b0 + b1 + b2) < price:
-            name, l0, l1, l2, sign = back, b0, b1, b2, -1
-            price = steering.reverse_cost * (b0 + b1 + b2)
-    _fill(word, name, l0, l1, l2, radius, sign)
+        back = dubins.shortest_to_point(x0, y0, th0 + math.pi, x1, y1, radius)
+        if steering.reverse_cost * dubins.length_of(back) < price:
+            curve, sign = back, -1
+            price = steering.reverse_cost * dubins.length_of(back)
+    _fill(word, curve, sign)
     return word, price
 
 

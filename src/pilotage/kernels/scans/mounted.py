@@ -6,14 +6,13 @@ What is solid is handed over as in ``geometry.solids``; ``mount`` is a sensor's 
 from __future__ import annotations
 
 import math
-from typing import TypeAlias
 
 import numpy as np
 
 from pilotage.kernels.arrays import FloatArray, IntArray
 from pilotage.kernels.geometry.solids import Fixed, Others, Tiles, is_anybody, without
 from pilotage.kernels.jit import kernel
-from pilotage.kernels.scans.rays import cone_range, narrow_fan
+from pilotage.kernels.scans.rays import Fan, cone_range, narrow_fan
 from pilotage.kernels.scans.sweep import narrow_grid_fan
 from pilotage.kernels.scans.tiles import (
     COSINE,
@@ -25,10 +24,6 @@ from pilotage.kernels.scans.tiles import (
     TILE_ROWS,
 )
 from pilotage.kernels.scans.trace import grid_beam
-
-Fan: TypeAlias = tuple[float, float, FloatArray, FloatArray, float]
-"""Beam k looks along ``first + k * step`` in the sensor's frame: first, step, cosines and sines of the
-directions from the first one (beams,), and the reach."""
 
 
 @kernel
@@ -51,19 +46,17 @@ def fans(
 
     The fan's reach where nothing is hit.
     """
-    first, step, cosines, sines, max_range = fan
     segments, circles, grid = fixed
-    out = np.full((poses.shape[0], cosines.shape[0]), max_range)
+    out = np.full((poses.shape[0], fan[2].shape[0]), fan[4])
     for r in range(poses.shape[0]):
         ranges = out[r]
         x, y, theta = mounted(poses[r, 0], poses[r, 1], poses[r, 2], mount)
-        theta += first
-        narrow_fan(ranges, x, y, theta, step, cosines, sines, max_range, segments, circles)
-        narrow_grid_fan(ranges, x, y, theta, step, cosines, sines, grid)
+        narrow_fan(ranges, x, y, theta, fan, segments, circles)
+        narrow_grid_fan(ranges, x, y, theta, fan, grid)
         if is_anybody(others):
             before, after = without(others, own[r])
-            narrow_fan(ranges, x, y, theta, step, cosines, sines, max_range, before[0], before[1])
-            narrow_fan(ranges, x, y, theta, step, cosines, sines, max_range, after[0], after[1])
+            narrow_fan(ranges, x, y, theta, fan, before[0], before[1])
+            narrow_fan(ranges, x, y, theta, fan, after[0], after[1])
     return out
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import TypeAlias
 
 import numpy as np
 
@@ -10,6 +11,9 @@ from pilotage.kernels.arrays import FloatArray
 from pilotage.kernels.geometry.motion import TWO_PI
 from pilotage.kernels.jit import kernel
 
+Fan: TypeAlias = tuple[float, float, FloatArray, FloatArray, float]
+"""Beam k looks along ``first + k * step`` in the sensor's frame: first, step, cosines and sines of the
+directions from the first one (beams,), and the reach."""
 BEAM_SLACK = 1e-9
 """In beams, added at both ends of an obstacle, so that no beam slips between two walls that meet."""
 
@@ -41,7 +45,9 @@ def fan_ranges(
         cosines[k] = c
         sines[k] = s
         c, s = c * cs - s * ss, s * cs + c * ss
-    return table_fan_ranges(x, y, first, step, cosines, sines, max_range, segments, circles)
+    ranges = np.full(beams, max_range)
+    narrow_fan(ranges, x, y, first, (0.0, step, cosines, sines, max_range), segments, circles)
+    return ranges
 
 
 @kernel
@@ -58,42 +64,17 @@ def _beams_between(first: float, last: float, beams: int) -> tuple[int, int]:
 
 
 @kernel
-def table_fan_ranges(
-    x: float,
-    y: float,
-    theta: float,
-    step: float,
-    cosines: FloatArray,
-    sines: FloatArray,
-    max_range: float,
-    segments: FloatArray,
-    circles: FloatArray,
-) -> FloatArray:
-    """``fan_ranges`` with the beams' directions from the first one given as a table.
+def narrow_fan(
+    ranges: FloatArray, x: float, y: float, theta: float, fan: Fan, segments: FloatArray, circles: FloatArray
+) -> None:
+    """Shorten the ``ranges`` of a fan, in place, where segments and circles are nearer.
 
     Each obstacle is met only by the beams inside the angle it subtends, so the work is the number of
-    (beam, obstacle) pairs that can meet at all. Obstacles are turned into the fan's own frame, in which
-    ``theta``, the first beam's direction in the map, is 0 and the table never changes.
+    (beam, obstacle) pairs that can meet at all. Obstacles are turned into the fan's own frame, in which the
+    first beam's direction is 0 and the table never changes.
     """
-    ranges = np.full(cosines.shape[0], max_range)
-    narrow_fan(ranges, x, y, theta, step, cosines, sines, max_range, segments, circles)
-    return ranges
-
-
-@kernel
-def narrow_fan(
-    ranges: FloatArray,
-    x: float,
-    y: float,
-    theta: float,
-    step: float,
-    cosines: FloatArray,
-    sines: FloatArray,
-    max_range: float,
-    segments: FloatArray,
-    circles: FloatArray,
-) -> None:
-    """Shorten the ``ranges`` of a fan, in place, where segments and circles are nearer."""
+    first, step, cosines, sines, max_range = fan
+    theta += first
     beams = cosines.shape[0]
     per_step = 1.0 / (step if beams > 1 else TWO_PI)
     ct, st = math.cos(theta), math.sin(theta)

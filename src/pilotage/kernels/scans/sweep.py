@@ -1,6 +1,6 @@
 """Fans of beams over a grid: each visible side of its occupied cells shortens the beams inside its angle.
 
-As ``rays.table_fan_ranges`` does for walls, but from near tiles to far ones, so that what is hidden is passed
+As ``rays.narrow_fan`` does for walls, but from near tiles to far ones, so that what is hidden is passed
 over by the tile, and in the grid's own frame, where a side is level or upright and a beam meets its line
 after one product.
 """
@@ -15,6 +15,7 @@ from pilotage.kernels.arrays import FloatArray
 from pilotage.kernels.geometry.motion import TWO_PI
 from pilotage.kernels.geometry.solids import Tiles
 from pilotage.kernels.jit import kernel
+from pilotage.kernels.scans.rays import Fan
 from pilotage.kernels.scans.tiles import (
     CELL,
     COSINE,
@@ -110,20 +111,13 @@ def narrow_by_side(
 
 
 @kernel
-def narrow_grid_fan(
-    ranges: FloatArray,
-    x: float,
-    y: float,
-    theta: float,
-    step: float,
-    cosines: FloatArray,
-    sines: FloatArray,
-    grid: Tiles,
-) -> None:
+def narrow_grid_fan(ranges: FloatArray, x: float, y: float, theta: float, fan: Fan, grid: Tiles) -> None:
     """Shorten the ``ranges`` of a fan, in place, where a grid's occupied cells are nearer.
 
-    The fan is as in ``rays.table_fan_ranges``; a fan of one beam has the step 0.
+    A fan of one beam has the step 0.
     """
+    first, step, cosines, sines, _ = fan
+    theta += first
     jump, outlines, starts, items, frame = grid
     if outlines.shape[0] == 0:
         return

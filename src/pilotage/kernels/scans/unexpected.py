@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from pilotage.kernels.arrays import BoolArray, FloatArray, IntArray
-from pilotage.kernels.geometry.field import interpolate_at
+from pilotage.kernels.geometry.field import Field, interpolate_at
 from pilotage.kernels.geometry.motion import wrap
 from pilotage.kernels.jit import kernel
 
@@ -22,18 +22,16 @@ def unexplained_points(
     reach: float,
     tolerance: float,
     tolerance_per_m: float,
-    distance: FloatArray,
-    x0: float,
-    y0: float,
-    resolution: float,
+    known: Field,
 ) -> tuple[FloatArray, IntArray]:
     """Endpoints (K, 2) of the beams shorter than ``reach`` that end farther from every known wall than
     ``tolerance + tolerance_per_m * range``; and which beams (K,) these are.
 
     Beams look from (x, y) along ``directions`` (N, 2) seen from the first one, which looks along ``first`` in
-    the map frame; ``distance`` is the distance field of the known map. A point outside the field counts as
+    the map frame; ``known`` has the distances on the known map. A point outside the field counts as
     explained.
     """
+    distance, x0, y0, resolution = known
     points = np.empty((ranges.shape[0], 2))
     beams = np.empty(ranges.shape[0], np.int64)
     count = 0

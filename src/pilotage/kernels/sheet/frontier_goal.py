@@ -8,30 +8,30 @@ import numpy as np
 
 from pilotage.kernels.arrays import BoolArray, FloatArray, IntArray
 from pilotage.kernels.jit import kernel
-from pilotage.kernels.sheet.space import clearance_along
+from pilotage.kernels.sheet.space import Lattice, clearance_along
+
+REACH = 3
+"""So many nodes beside a point may be the last ones before it."""
 
 
 @kernel
 def entry_node(
     cost: FloatArray,
-    rows: int,
-    columns: int,
-    width_m: float,
-    height_m: float,
+    lattice: Lattice,
     x: float,
     y: float,
-    reach: int,
     clearance_m: float,
     segments: FloatArray,
     points: FloatArray,
 ) -> int:
     """The node by which to come to a point at the least cost, the last bit being straight; -1 for none."""
+    rows, columns, width_m, height_m = lattice
     column, row = round(x / width_m), round(y / height_m)
     if 0 <= row < rows and 0 <= column < columns and cost[row * columns + column] < np.inf:
         return row * columns + column
     best, node = np.inf, -1
-    for r in range(max(row - reach, 0), min(row + reach + 1, rows)):
-        for c in range(max(column - reach, 0), min(column + reach + 1, columns)):
+    for r in range(max(row - REACH, 0), min(row + REACH + 1, rows)):
+        for c in range(max(column - REACH, 0), min(column + REACH + 1, columns)):
             path = math.hypot(c * width_m - x, r * height_m - y)
             value = cost[r * columns + c] + 3.0 * path
             if value < best and (
@@ -49,10 +49,7 @@ def choose_goal(
     unknown: FloatArray,
     penalty: FloatArray,
     cost: FloatArray,
-    rows: int,
-    columns: int,
-    width_m: float,
-    height_m: float,
+    lattice: Lattice,
     pose: tuple[float, float, float],
     room_m: float,
     body_m: float,
@@ -79,7 +76,7 @@ def choose_goal(
     penalty
         (R, C) metres added for having failed there.
     cost
-        From ``travel_costs``, for nodes of (rows, columns) spaced by width and height.
+        From ``travel_costs``, for the lattice's nodes.
 
     Returns
     -------
@@ -99,9 +96,7 @@ def choose_goal(
             bonus = 5.0 * hug_m + gain_m
             if straight + penalty[row, column] - bonus >= best:
                 continue
-            entry = entry_node(
-                cost, rows, columns, width_m, height_m, x, y, 3, body_m + room_m, segments, points
-            )
+            entry = entry_node(cost, lattice, x, y, body_m + room_m, segments, points)
             if entry < 0:
                 continue
             turn = 0.0
@@ -126,9 +121,7 @@ def choose_goal(
 def straightened(
     parent: IntArray,
     node: int,
-    columns: int,
-    width_m: float,
-    height_m: float,
+    lattice: Lattice,
     x: float,
     y: float,
     clearance_m: float,
@@ -136,6 +129,7 @@ def straightened(
     points: FloatArray,
 ) -> FloatArray:
     """(K, 2) path from a point to a node: as few straight lines as keep the clearance, else node by node."""
+    _, columns, width_m, height_m = lattice
     count = 0
     at = node
     while at >= 0:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,15 @@ from pilotage.kernels.jit import kernel
 NO_POINTS = np.zeros((0, 2))
 FAR_M = 1.0
 """Clearances above are not told apart."""
+
+
+class Lattice(NamedTuple):
+    """Nodes at (column * width, row * height)."""
+
+    rows: int
+    columns: int
+    width_m: float
+    height_m: float
 
 
 @kernel
@@ -42,16 +52,9 @@ def clearances(points: FloatArray, segments: FloatArray) -> FloatArray:
 
 
 @kernel
-def clearance_field(
-    rows: int,
-    columns: int,
-    width_m: float,
-    height_m: float,
-    segments: FloatArray,
-    points: FloatArray,
-    reach_m: float,
-) -> FloatArray:
-    """(rows, columns) clearance at nodes (column * width, row * height); points count within reach."""
+def clearance_field(lattice: Lattice, segments: FloatArray, points: FloatArray, reach_m: float) -> FloatArray:
+    """(rows, columns) clearance at the lattice's nodes; points count within reach."""
+    rows, columns, width_m, height_m = lattice
     field = np.empty((rows, columns))
     for row in range(rows):
         for column in range(columns):

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from pilotage.kernels.arrays import FloatArray, IntArray
 from pilotage.kernels.jit import kernel
-from pilotage.kernels.slam.match_grid import ScoreArray
+from pilotage.kernels.slam.match_grid import ScoreArray, Scores
 
 _LOOK_EVERY, _SPREAD = 4, 16
 PASS_OVER_NONE = np.array([0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0])
@@ -132,11 +132,7 @@ def _is_passed_over(x: float, y: float, theta: float, away: FloatArray) -> bool:
 
 @kernel
 def search_window(
-    pyramid: ScoreArray,
-    margin: int,
-    corner_x: float,
-    corner_y: float,
-    cell_m: float,
+    scores: Scores,
     points_xy: FloatArray,
     centre: FloatArray,
     half_m: float,
@@ -151,10 +147,6 @@ def search_window(
 
     Parameters
     ----------
-    pyramid, margin
-        From ``max_pyramid``; scores are 1 at most.
-    corner_x, corner_y, cell_m
-        The grid's lower-left corner and its cells' side.
     points_xy
         (K, 2) in the moving frame.
     centre, half_m
@@ -182,6 +174,7 @@ def search_window(
     nodes
         Nodes looked at; more than the budget where the search was cut off and the answer may not be the best.
     """
+    pyramid, margin, corner_x, corner_y, cell_m = scores
     levels = pyramid.shape[0] - 1
     count = points_xy.shape[0]
     best = np.array([centre[0], centre[1], centre[2], -math.inf])

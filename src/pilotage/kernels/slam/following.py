@@ -9,8 +9,8 @@ import numpy as np
 from pilotage.kernels.arrays import FloatArray, IntArray
 from pilotage.kernels.jit import kernel
 from pilotage.kernels.slam.frames import between, composed
-from pilotage.kernels.slam.local_map import LocalMap, add_to_map
-from pilotage.kernels.slam.movers import MOST, Views, add_view, without_movers
+from pilotage.kernels.slam.local_map import add_to_map
+from pilotage.kernels.slam.movers import MOST, add_view, without_movers
 from pilotage.kernels.slam.neighbourhood import is_best_near
 from pilotage.kernels.slam.placing import (
     CREDIBLE,
@@ -26,7 +26,7 @@ from pilotage.kernels.slam.placing import (
 from pilotage.kernels.slam.recorded_motions import motion_of, move_anchor
 from pilotage.kernels.slam.scan_lines import lines_of, rays_of, scan_points
 from pilotage.kernels.slam.slips import add_slip
-from pilotage.kernels.slam.track import Keyframes, Look, Recording, Track, has_room
+from pilotage.kernels.slam.track import Keyframes, Recording, Track, Tracked, has_room
 from pilotage.kernels.slam.wheels import HELD, learn_wheels
 
 SURE_GUESS = 0.035
@@ -57,17 +57,9 @@ def thinned(cloud: FloatArray) -> FloatArray:
 
 
 @kernel
-def _walls(
-    points: FloatArray,
-    step: FloatArray,
-    led: bool,
-    dt_s: float,
-    track: Track,
-    map_: LocalMap,
-    views: Views,
-    out: Look,
-) -> IntArray:
+def _walls(points: FloatArray, step: FloatArray, led: bool, dt_s: float, tracked: Tracked) -> IntArray:
     """Guess a scan's motion, into ``out``, and tell which of its points (K, 2 or more) are no people (N,)."""
+    track, map_, views, out = tracked
     motions, credible = guessed_motions(track.errors, track.velocity, step, led, dt_s)
     out.motions[: motions.shape[0]] = motions
     out.counts[0], out.counts[1] = motions.shape[0], credible
@@ -80,26 +72,19 @@ def _walls(
 
 
 @kernel
-def _is_sure(
-    light: FloatArray,
-    led: bool,
-    others: FloatArray,
-    prior: FloatArray,
-    track: Track,
-    map_: LocalMap,
-    out: Look,
-) -> bool:
+def _is_sure(light: FloatArray, led: bool, others: FloatArray, tracked: Tracked) -> bool:
     """Place a scan (K, 6) by the motions that were guessed, and tell whether there is no doubt of it."""
+    track, map_, _, out = tracked
     error = track.errors.min()
     leads = led and track.errors[0] == error
     motions, credible = out.motions[: out.counts[0]], out.counts[1]
     pose, hessian, start, told, split = placed(
-        light, track.pose, motions, credible, leads, others, error, track.usual[0], not led, prior, map_
+        light, track.pose, motions, credible, leads, others, error, track.usual[0], not led, map_
     )
     out.counts[2] = split
     out.pose[:], out.hessian[:], out.start[:], out.told[:] = pose, hessian, start, told
     if not led:
-        return is_best_near(light, track.pose, motions[:credible], error, track.usual[0], prior, map_, out)
+        return is_best_near(light, track.pose, motions[:credible], error, track.usual[0], map_, out)
     # Seldom does a scan that lies where a trusted odometry has it fit better anywhere else; but from a long
     # guess an alignment may end in a wrong fit that is not poor.
     long = leads and distance(motions[0], np.zeros(3)) > LONG_M
@@ -111,16 +96,7 @@ def _is_sure(
 
 @kernel
 def look(
-    cloud: FloatArray,
-    step: FloatArray,
-    led: bool,
-    others: FloatArray,
-    dt_s: float,
-    prior: FloatArray,
-    track: Track,
-    map_: LocalMap,
-    views: Views,
-    out: Look,
+    cloud: FloatArray, step: FloatArray, led: bool, others: FloatArray, dt_s: float, tracked: Tracked
 ) -> tuple[FloatArray, FloatArray, bool]:
     """Place a scan (K, 6) by the guesses of its motion.
 
@@ -129,10 +105,10 @@ def look(
     The scan without people, as much of it as was aligned, and whether it lies where ``out`` has it without a
     doubt.
     """
-    rows = _walls(cloud, step, led, dt_s, track, map_, views, out)
+    rows = _walls(cloud, step, led, dt_s, tracked)
     kept = cloud if rows.shape[0] == cloud.shape[0] else cloud[rows]
     light = thinned(kept)
-    return kept, light, _is_sure(light, led, others, prior, track, map_, out)
+    return kept, light, _is_sure(light, led, others, tracked)
 
 
 @kernel
@@ -152,13 +128,12 @@ def settle(
     step: FloatArray,
     led: bool,
     dt_s: float,
-    prior: FloatArray,
     track: Track,
 ) -> None:
     """Let a track go on to where a scan was found to lie; ``told`` as of ``placed``."""
     error = track.errors.min()
     leads = led and track.errors[0] == error
-    add_slip(track.slip, track.held, start, pose, hessian, told[3], error, leads, prior)
+    add_slip(track.slip, track.held, start, pose, hessian, told[3], error, leads)
     track.fitted[0] = told[0] / track.usual[0]
     track.usual[0] += 0.02 * (told[0] - track.usual[0])
     track.usual[1] += 0.05 * (told[2] - track.usual[1])
@@ -193,9 +168,7 @@ def keep(
     hessian: FloatArray,
     led: bool,
     local: int,
-    track: Track,
-    map_: LocalMap,
-    views: Views,
+    tracked: Tracked,
     out: Keyframes,
 ) -> None:
     """Make the last scan a keyframe.
@@ -207,6 +180,7 @@ def keep(
     led, local
         Whether there is odometry, and how many keyframes lend their points to the scans that follow.
     """
+    track, map_, views, _ = tracked
     number = out.added[0]
     end = out.starts[number] + kept.shape[0]
     out.points[out.starts[number] : end] = kept
@@ -228,11 +202,7 @@ def follow(
     end: int,
     limits: FloatArray,
     local: int,
-    prior: FloatArray,
-    track: Track,
-    map_: LocalMap,
-    views: Views,
-    out: Look,
+    tracked: Tracked,
     keyframes: Keyframes,
     poses: FloatArray,
     owners: IntArray,
@@ -254,6 +224,7 @@ def follow(
     ``FULL`` (there is no room for another keyframe) or ``ENDED``, and of the last scan all points (K, 2),
     those without people (K, 6), of a doubt only, and those that are aligned (K, 6).
     """
+    track, map_, views, out = tracked
     led = recording.at_scans.shape[0] > 0
     rays, seen_from = np.zeros((0, 2)), -1
     seen, kept, light = np.zeros((0, 2)), np.zeros((0, 6)), np.zeros((0, 6))
@@ -273,19 +244,19 @@ def follow(
         dt_s = recording.dt_s[i]
         walls = np.flatnonzero(hit)
         seen = points[walls]
-        walls = walls[_walls(seen, step, led, dt_s, track, map_, views, out)]
+        walls = walls[_walls(seen, step, led, dt_s, tracked)]
         # A line is fitted where it is asked for: of a keyframe through every point.
         every = _every(walls.shape[0])
         light = lines_of(points, hit, walls[::every].copy(), recording.step_rad[i])
-        if not _is_sure(light, led, others, prior, track, map_, out):
+        if not _is_sure(light, led, others, tracked):
             kept = light if every == 1 else lines_of(points, hit, walls, recording.step_rad[i])
             return i, DOUBT, seen, kept, light
         move_anchor(recording, i, step, others, between(track.pose, out.pose))
-        settle(out.pose, out.hessian, out.start, out.told, step, led, dt_s, prior, track)
+        settle(out.pose, out.hessian, out.start, out.told, step, led, dt_s, track)
         if is_new(between(track.keyframe, track.pose), limits[2], limits[3]) or leaves(
             track, out.told[0], led
         ):
             every_line = light if every == 1 else lines_of(points, hit, walls, recording.step_rad[i])
-            keep(i, seen, every_line, out.hessian, led, local, track, map_, views, keyframes)
+            keep(i, seen, every_line, out.hessian, led, local, tracked, keyframes)
         poses[i], owners[i] = out.pose, keyframes.added[0] - 1
     return end, ENDED, seen, kept, light

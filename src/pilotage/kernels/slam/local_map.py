@@ -29,6 +29,11 @@ FUSED_M = 0.03
 """Without odometry points that are farther apart stay apart."""
 MOST_WEIGHT = 30.0
 """So many of a point's sightings count at most: what was seen lately leads."""
+PRIOR = np.diag([2.0, 2.0, 20.0])
+"""Holds the pose at the guess where the scan leaves it open, in squared residuals. More would pull every
+scan a little towards an odometry whose errors all have one sign."""
+FINAL_REACH_M, SCALE_M, ITERATIONS = 0.2, 0.05, 25
+"""Greatest distance of a pair and scale of ``align`` in the end, and its steps."""
 LAST_STEP_M = 5e-4
 """An alignment whose steps have become so short has ended."""
 LOOKS = 6
@@ -234,30 +239,23 @@ def square_at(map_: LocalMap, x: float, y: float) -> float:
 
 @kernel
 def align_in_map(
-    map_: LocalMap,
-    source: FloatArray,
-    start: FloatArray,
-    prior: FloatArray,
-    reach_m: float,
-    final_reach_m: float,
-    scale_m: float,
-    iterations: int,
-    known: FloatArray,
+    map_: LocalMap, source: FloatArray, start: FloatArray, reach_m: float, known: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, int]:
     """Align a scan (K, 6) with a map, as ``align`` does with points in buckets.
 
-    Where it comes to a pose that is ``known`` (3,) already it ends with the status ``MET``.
+    ``reach_m`` is the greatest distance of a pair at first. Where it comes to a pose that is ``known`` (3,)
+    already it ends with the status ``MET``.
     """
     pose, hessian, fit = start.copy(), np.zeros((3, 3)), np.zeros(4)
     paired = np.empty(source.shape[0], np.int64)
-    limits = first_limits(reach_m, final_reach_m, scale_m, LAST_STEP_M)
+    limits = first_limits(reach_m, FINAL_REACH_M, SCALE_M, LAST_STEP_M)
     status = CAPPED
-    for m in range(iterations):
+    for m in range(ITERATIONS):
         # Then the pairs stay: two cells whose points differ may send a scan to and fro.
         if m < LOOKS:
             looked_up(map_, source, pose[0], pose[1], pose[2], paired)
         status = improved(
-            source, map_.points, paired, start, prior, final_reach_m, scale_m, limits, pose, hessian, fit
+            source, map_.points, paired, start, PRIOR, FINAL_REACH_M, SCALE_M, limits, pose, hessian, fit
         )
         if status != CAPPED:
             break

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -99,6 +100,24 @@ def _mark_open(
                 if 0 <= r < rows and 0 <= c < columns:
                     grid[r, c] = open_score
         first += counts[s]
+
+
+class Scores(NamedTuple):
+    """Scores of a grid's cells, 1 at most, with their maxima (``max_pyramid``), and where they lie.
+
+    ``corner_x`` and ``corner_y`` are those of the grid's lower-left corner, ``cell_m`` is its cells' side.
+    """
+
+    pyramid: ScoreArray
+    margin: int
+    corner_x: float
+    corner_y: float
+    cell_m: float
+
+
+def scores_of(grid: ScoreArray, levels: int, corner_xy_m: FloatArray, cell_m: float) -> Scores:
+    """Of a grid (rows, columns) from its lower-left corner (2,)."""
+    return Scores(*max_pyramid(grid, levels), float(corner_xy_m[0]), float(corner_xy_m[1]), cell_m)
 
 
 @kernel

@@ -16,11 +16,8 @@ from pilotage.kernels.slam.align import TOO_FEW
 from pilotage.kernels.slam.frames import between
 from pilotage.kernels.slam.local_map import MET, LocalMap, align_in_map, square_at
 from pilotage.kernels.slam.placing import (
-    ITERATIONS,
     POOR,
     POOR_AS_GUESSED,
-    REACH_M,
-    SCALE_M,
     plausibility,
 )
 from pilotage.kernels.slam.track import Look
@@ -115,7 +112,6 @@ def is_best_near(
     motions: FloatArray,
     error: float,
     usual: float,
-    prior: FloatArray,
     map_: LocalMap,
     out: Look,
 ) -> bool:
@@ -123,7 +119,7 @@ def is_best_near(
 
     Parameters
     ----------
-    source, last, error, usual, prior, map_
+    source, last, error, usual, map_
         As in ``placed``.
     motions
         (G, 3) the credible guesses.
@@ -138,9 +134,7 @@ def is_best_near(
         start, found = best_near(map_, source, out.pose, weak_course(out.hessian), half_m, turned)
         if not found:
             break
-        pose, system, fit, status = align_in_map(
-            map_, source, start, prior, NEAR_M, REACH_M, SCALE_M, ITERATIONS, out.pose
-        )
+        pose, system, fit, status = align_in_map(map_, source, start, NEAR_M, out.pose)
         if status in (TOO_FEW, MET):
             break
         share, off = plausibility(between(last, pose), motions, error, False)

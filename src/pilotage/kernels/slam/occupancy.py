@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,25 +13,25 @@ from pilotage.kernels.jit import kernel
 
 OddsArray = NDArray[np.int8]
 """Log-odds in whole steps: a byte is enough, and a building has tens of millions of cells."""
+OddsGrid: TypeAlias = tuple[OddsArray, float, float, float]
+"""Log-odds (rows, columns), row 0 with the least y, x and y of its lower-left corner, and a cell's side."""
+HIT_ODDS, MISS_ODDS, MOST_ODDS = 17, 5, 120
+"""What a hit adds, what a passing beam takes, and where both end (at most 127); in twentieths."""
+WALL_ODDS = HIT_ODDS
+"""A beam that nothing came back from says nothing beyond a cell of more than one hit: it was swallowed by
+what others saw there (dark paint, glass at a slant), not let through."""
 
 
 @kernel
 def add_scan(
-    odds: OddsArray,
-    corner_x: float,
-    corner_y: float,
-    cell_m: float,
+    grid: OddsGrid,
     pose: FloatArray,
     ranges_m: FloatArray,
     first_rad: float,
     step_rad: float,
     farthest_m: float,
-    hit_odds: int,
-    miss_odds: int,
-    most_odds: int,
-    wall_odds: int,
 ) -> None:
-    """Add a scan to the log-odds (rows, columns) of a grid, row 0 with the least y.
+    """Add a scan to the log-odds of a grid.
 
     Parameters
     ----------
@@ -38,12 +39,8 @@ def add_scan(
         (3,) of the scanner in the map.
     ranges_m
         (B,) NaN for no measurement; beyond ``farthest_m`` (or infinite) a beam only clears up to there.
-    hit_odds, miss_odds, most_odds
-        What a hit adds, what a passing beam takes, and where both end (at most 127).
-    wall_odds
-        A beam that nothing came back from says nothing beyond a cell of more than this: it was swallowed by
-        what others saw there (dark paint, glass at a slant), not let through.
     """
+    odds, corner_x, corner_y, cell_m = grid
     rows, columns = odds.shape
     ox, oy = (pose[0] - corner_x) / cell_m, (pose[1] - corner_y) / cell_m
     for k in range(ranges_m.shape[0]):
@@ -69,9 +66,9 @@ def add_scan(
             if min(tc, tr) > reach:
                 break
             if 0 <= row < rows and 0 <= c < columns:
-                if not hit and odds[row, c] > wall_odds:
+                if not hit and odds[row, c] > WALL_ODDS:
                     break
-                odds[row, c] = max(-most_odds, odds[row, c] - miss_odds)
+                odds[row, c] = max(-MOST_ODDS, odds[row, c] - MISS_ODDS)
             if tc < tr:
                 tc += dc
                 c += sc
@@ -79,4 +76,4 @@ def add_scan(
                 tr += dr
                 row += sr
         if hit and 0 <= end_r < rows and 0 <= end_c < columns:
-            odds[end_r, end_c] = min(most_odds, odds[end_r, end_c] + hit_odds)
+            odds[end_r, end_c] = min(MOST_ODDS, odds[end_r, end_c] + HIT_ODDS)

@@ -15,12 +15,13 @@ SPREAD = 2
 """So many scans before and after the reference lend it their points. None where the moving scan is near the
 reference itself."""
 REACH_M, LAST_REACH_M, SCALE_M = 0.3, 0.12, 0.03
+PRIOR = np.diag([0.5, 0.5, 5.0])
 """As in ``align``."""
 
 
 @kernel
 def align_pairs(
-    points: FloatArray, starts: IntArray, poses: FloatArray, pairs: IntArray, prior: FloatArray
+    points: FloatArray, starts: IntArray, poses: FloatArray, pairs: IntArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, IntArray]:
     """Align scans with the surroundings of others, each from where the poses have it.
 
@@ -32,8 +33,6 @@ def align_pairs(
         (S, 3) in one frame.
     pairs
         (M, 2) reference and moving scan, sorted by the reference.
-    prior
-        As in ``align``.
 
     Returns
     -------
@@ -60,7 +59,7 @@ def align_pairs(
         pose, hessian, fit, told = align(
             points[starts[j] : starts[j + 1]],
             between(poses[i], poses[j]),
-            prior,
+            PRIOR,
             REACH_M,
             LAST_REACH_M,
             SCALE_M,

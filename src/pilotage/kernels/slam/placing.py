@@ -12,7 +12,7 @@ from pilotage.kernels.slam.align import TOO_FEW
 from pilotage.kernels.slam.frames import between, composed
 from pilotage.kernels.slam.local_map import MET, LocalMap, align_in_map
 
-START_REACH_M, REACH_M, SCALE_M, ITERATIONS = 0.4, 0.2, 0.05, 25
+START_REACH_M = 0.4
 CREDIBLE, CREDIBLE_OFF = 3.0, 0.003
 """A guess is credible whose mean error is within this factor of the least, and this more."""
 POOR, POOR_AS_GUESSED = 0.75, 0.6
@@ -183,7 +183,6 @@ def placed(
     error: float,
     usual: float,
     alone: bool,
-    prior: FloatArray,
     map_: LocalMap,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, bool]:
     """Align a scan from one guess after the other until it fits as well as usual.
@@ -204,7 +203,7 @@ def placed(
         Usual error of the most trusted guess, and usual value of a fit.
     alone
         Whether there is no odometry: then one good fit is enough, for its neighbourhood is looked at later.
-    prior, map_
+    map_
         As in ``align_in_map``.
 
     Returns
@@ -230,9 +229,7 @@ def placed(
             break
         motion = motions[k] if k < count else others[k - count]
         began = composed(last, motion)
-        pose, system, fit, status = align_in_map(
-            map_, source, began, prior, START_REACH_M, REACH_M, SCALE_M, ITERATIONS, known
-        )
+        pose, system, fit, status = align_in_map(map_, source, began, START_REACH_M, known)
         if status in (TOO_FEW, MET):
             continue
         share, off = plausibility(between(last, pose), near, error, led)

@@ -10,6 +10,7 @@ from pilotage.kernels.arrays import FloatArray
 from pilotage.kernels.jit import kernel
 from pilotage.kernels.slam.align import solve3
 from pilotage.kernels.slam.frames import between
+from pilotage.kernels.slam.local_map import PRIOR
 
 CHANCE = 0.03
 """Part of the weights of an alignment's points that tells nothing: their lines' directions are not exact, so
@@ -64,7 +65,6 @@ def add_slip(
     weight: float,
     error: float,
     by_chance: bool,
-    prior: FloatArray,
 ) -> None:
     """Add what a scan may have slipped, in its own frame.
 
@@ -77,8 +77,6 @@ def add_slip(
     error, by_chance
         Usual error of the guess it began from, which is all that tells where the alignment leaves the pose
         open; and whether it errs by chance, not the same all along.
-    prior
-        (3, 3) information of the start in the alignment.
     """
     off = between(start, pose)
     far, turned = math.hypot(off[0], off[1]), abs(off[2])
@@ -94,7 +92,7 @@ def add_slip(
     # Squared: what the map holds, however weakly, does not add up from scan to scan.
     share = np.empty((3, 3))
     for a in range(3):
-        solve3(told + prior, prior[:, a], share[:, a])
+        solve3(told + PRIOR, PRIOR[:, a], share[:, a])
     left = error * _product(share, share)
     if by_chance:
         total += _product(left, left.T)

@@ -76,6 +76,15 @@ class Look(NamedTuple):
     told: FloatArray
 
 
+class Tracked(NamedTuple):
+    """A track, what its last keyframes saw, as points and as beams, and what was made of the last scan."""
+
+    track: Track
+    map_: LocalMap
+    views: Views
+    out: Look
+
+
 class Keyframes(NamedTuple):
     """Scans that became keyframes and were not fetched yet.
 

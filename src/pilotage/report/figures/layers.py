@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.path import Path as Outline
 
-from pilotage.core.types import FloatArray
+from pilotage.core.types import FloatArray, Pose2
 from pilotage.records.run_data import RunData
 from pilotage.records.world import World
 from pilotage.report.style import (
@@ -214,9 +214,8 @@ def body_outline(
     """(n, 2) closed rim of a body at a pose."""
     if polygon_m is None or not len(polygon_m) or theta is None or not math.isfinite(theta):
         return np.asarray((radius_m * _CIRCLE).T + np.array([x, y]))
-    c, s = math.cos(theta), math.sin(theta)
-    turned = polygon_m @ np.array([(c, s), (-s, c)]) + (x, y)
-    return np.vstack([turned, turned[:1]])
+    placed = Pose2(x, y, theta).placed(polygon_m)
+    return np.vstack([placed, placed[:1]])
 
 
 def line(axes: Axes, points: FloatArray, layer: str, **look: Any) -> None:

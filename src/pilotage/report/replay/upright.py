@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from pilotage.core.types import FloatArray, IntArray
+from pilotage.core.types import FloatArray, IntArray, Pose2
 
 Box = tuple[float, float, float, float]
 """x_min, y_min, x_max, y_max in metres."""
@@ -15,10 +15,8 @@ Box = tuple[float, float, float, float]
 def box_around(origin: FloatArray, size_m: FloatArray) -> Box:
     """The upright box around a map of (2,) width and height, whose lower left corner has the pose (3,)."""
     width, height = size_m
-    x, y, turned = origin.tolist()
-    c, s = math.cos(turned), math.sin(turned)
     own = np.array([(0.0, 0.0), (width, 0.0), (width, height), (0.0, height)])
-    corners = own @ np.array([(c, s), (-s, c)]) + (x, y)
+    corners = Pose2.from_array(origin).placed(own)
     (x0, y0), (x1, y1) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
     return x0, y0, x1, y1
 

@@ -71,10 +71,7 @@ class Intruder:
         x, y = setting.robots_m[0, :2].tolist()
         if not ground.has_room(x, y):
             raise InputError(f"{setting.where}.doors_m: expected places, found none; name some")
-        reached = ground.towards(np.array([[x, y]]), setting.where).cost[0]
-        nobody = np.zeros((0, 3))
-        drawn = [ground.random_place(self._rng, reached, nobody) for _ in range(DOORS)]
-        places = [place for place in drawn if place is not None]
+        places = ground.places_beside(x, y, DOORS, self._rng, setting.where)
         if not places:
             raise InputError(f"{setting.where}.doors_m: expected room to walk, found none; name places")
         return np.array(places)

@@ -88,10 +88,7 @@ class SocialForcePeople:
                 f"{setting.where}.doors_m: expected two places or more where the first robot stands too "
                 f"narrow for a person, found none"
             )
-        reached = ground.towards(np.array([[x, y]]), setting.where).cost[0]
-        nobody = np.zeros((0, 3))
-        found = [ground.random_place(self._rng, reached, nobody) for _ in range(DOORS)]
-        places = [place for place in found if place is not None]
+        places = ground.places_beside(x, y, DOORS, self._rng, setting.where)
         if len(places) < 2:
             raise InputError(f"{setting.where}.doors_m: expected room to walk, found none; name places")
         return np.array(places)

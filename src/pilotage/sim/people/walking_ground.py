@@ -106,3 +106,11 @@ class WalkingGround:
             if (np.hypot(*(apart[:, :2] - place).T) > apart[:, 2] + self.radius_m).all():
                 return place
         return None
+
+    def places_beside(
+        self, x_m: float, y_m: float, count: int, rng: np.random.Generator, where: str
+    ) -> list[FloatArray]:
+        """Up to so many places by chance that a path leads to from a point."""
+        reached, nobody = self.towards(np.array([[x_m, y_m]]), where).cost[0], np.zeros((0, 3))
+        drawn = [self.random_place(rng, reached, nobody) for _ in range(count)]
+        return [place for place in drawn if place is not None]

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from pilotage.kernels.scans import mounted
+from pilotage.kernels.scans import mounted, rays
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan
 from pilotage.sim.sensing.noise import NoiseBlocks
@@ -17,7 +17,7 @@ BLOCK = 16
 """Scans whose noise is drawn at once."""
 
 
-def fan_of(config: LidarConfig) -> mounted.Fan:
+def fan_of(config: LidarConfig) -> rays.Fan:
     """A scanner's beams as the kernels take them."""
     angles = config.beam_angles_rad()
     from_first = angles - angles[0]

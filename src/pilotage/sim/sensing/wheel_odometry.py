@@ -22,15 +22,9 @@ class SimulatedWheelOdometry:
     """
 
     def __init__(self, config: WheelOdometryConfig, carrier: Carrier, rng: np.random.Generator) -> None:
-        c = config
-        self._densities = (
-            c.distance_var_m2_per_m,
-            c.distance_var_m2_per_rad,
-            c.angle_var_rad2_per_rad,
-            c.angle_var_rad2_per_m,
-        )
-        self._scales = (c.distance_scale, c.angle_scale)
-        self._drift = c.angle_bias_rad_s / c.rate_hz
+        self._densities = config.densities
+        self._scales = (config.distance_scale, config.angle_scale)
+        self._drift = config.angle_bias_rad_s / config.rate_hz
         self._last = carrier.body.state[drive.DISTANCE : drive.ANGLE + 1]
         self._normals = Normals(rng)
         self._distance = self._lateral = self._angle = 0.0

@@ -12,7 +12,7 @@ from pilotage.kernels.bodies import clearances, drive
 from pilotage.kernels.geometry.motion import turned_part
 from pilotage.kernels.geometry.plane import NO_CIRCLES, NO_SEGMENTS
 from pilotage.kernels.geometry.solids import Fixed
-from pilotage.kernels.scans import mounted, sight
+from pilotage.kernels.scans import mounted, rays, sight
 from pilotage.maps.landmarks import Landmarks
 from pilotage.maps.world_map import WorldMap
 from pilotage.models.footprint import Footprint
@@ -193,7 +193,7 @@ class World:
         nobody = np.tile(NOBODY, (len(places), 1)) if own is None else own
         return self.scan_along(places, fan_of(angles_rad, max_range_m), nobody)
 
-    def scan_along(self, places: FloatArray, fan: mounted.Fan, own: IntArray) -> FloatArray:
+    def scan_along(self, places: FloatArray, fan: rays.Fan, own: IntArray) -> FloatArray:
         """The same from poses (N, 3) of who scans again and again along one fan."""
         return mounted.fans(places, own, np.zeros(3), fan, self.fixed, self.traffic.others)
 
@@ -323,7 +323,7 @@ class World:
         return np.zeros(len(points_xy_m)) if self.ground is None else self.ground.slopes_rad(points_xy_m)
 
 
-def fan_of(angles_rad: FloatArray, max_range_m: float) -> mounted.Fan:
+def fan_of(angles_rad: FloatArray, max_range_m: float) -> rays.Fan:
     """Beams at equal steps (B,), and how far they reach, as the kernels take them."""
     step = float(angles_rad[1] - angles_rad[0]) if len(angles_rad) > 1 else 0.0
     from_first = angles_rad - angles_rad[0]

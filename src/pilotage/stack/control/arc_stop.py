@@ -54,14 +54,8 @@ class ArcStop:
         # Nearly always so, and quickly told.
         if abs(along_m_s) + abs(across_m_s) <= self._may_differ_m_s:
             return
-        distance_var, _ = increment_variances(
-            math.hypot(told.distance_m, told.lateral_m),
-            told.angle_rad,
-            sheet.distance_var_m2_per_m,
-            sheet.distance_var_m2_per_rad,
-            sheet.angle_var_rad2_per_rad,
-            sheet.angle_var_rad2_per_m,
-        )
+        driven_m = math.hypot(told.distance_m, told.lateral_m)
+        distance_var, _ = increment_variances(driven_m, told.angle_rad, *sheet.densities)
         noise_m_s = STDS * math.sqrt(distance_var) / dt_s
         if math.hypot(along_m_s, across_m_s) > self._may_differ_m_s + noise_m_s:
             self._going = Twist(told.distance_m / dt_s, told.angle_rad / dt_s, told.lateral_m / dt_s)

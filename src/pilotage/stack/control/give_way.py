@@ -60,16 +60,13 @@ class GiveWay:
         if not discs.shape[1]:
             return True
         return not drive_closes_in(
-            pose.x_m,
-            pose.y_m,
-            pose.theta_rad,
+            (pose.x_m, pose.y_m, pose.theta_rad),
             command.v_m_s,
             command.w_rad_s,
             self._config.hold_s + self._delay_s,
             self._braking_m_s2,
             CHECK_STEP_S,
-            self._footprint.points_m,
-            self._footprint.radius_m,
+            self._footprint.outline,
             np.ascontiguousarray(discs),
             self._config.keep_m,
         )

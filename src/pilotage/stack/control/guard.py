@@ -67,13 +67,13 @@ class ArcGuard:
 
     def corners_may(self, command: Twist, pose: Pose2, walls: NearWalls, circles_m: FloatArray) -> bool:
         """Whether the outline keeps the margin, or comes no nearer than it is; a disc's is not asked for."""
-        corners, radius_m = self._footprint.points_m, self._footprint.radius_m
-        if not len(corners):
+        outline, radius_m = self._footprint.outline, self._footprint.radius_m
+        if self._footprint.is_disc:
             return True
         poses = _along(command, pose, self._horizon_s, PIECES)
         near = walls.near(pose.x_m, pose.y_m, abs(command.v_m_s) * self._horizon_s + 2.0 * radius_m)
-        now_m = least_along(poses[:1], corners, radius_m, near, circles_m)
-        least_m = least_along(poses[1:], corners, radius_m, near, circles_m)
+        now_m = least_along(poses[:1], outline, near, circles_m)
+        least_m = least_along(poses[1:], outline, near, circles_m)
         return bool(least_m >= min(self._margin_m, now_m))
 
 

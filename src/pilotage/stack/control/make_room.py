@@ -61,7 +61,8 @@ class MakeRoom:
     ) -> None:
         self._config, self._field, self._bodies = config, field, bodies
         self._radius_m, self._turns = robot.radius_m, robot.motion.least_turning_radius_m == 0.0
-        self._corners_m, self._walls = robot.footprint.points_m, NearWalls(field.segments_m)
+        self._outline, self._walls = robot.footprint.outline, NearWalls(field.segments_m)
+        self._corners_m = robot.footprint.points_m
         self._braking_m_s2 = min(robot.motion.braking_m_s2, robot.motion.top_speed_m_s / robot.dt_s)
         self._rate_rad_s = min(0.8, robot.motion.top_turn_rate_rad_s)
         self._speed_m_s = min(config.speed_m_s, robot.motion.top_speed_m_s)
@@ -161,7 +162,7 @@ class MakeRoom:
         walls_m = self._walls.near(poses[0].x_m, poses[0].y_m, reach_m)
         circles_m = np.concatenate([self._field.circles_m, bodies_m])
         rows = np.array([pose.as_array() for pose in poses])
-        return float(least_along(rows, self._corners_m, self._radius_m, walls_m, circles_m))
+        return float(least_along(rows, self._outline, walls_m, circles_m))
 
     def _ends_at(self, pose: Pose2, command: Twist, holds_s: float, bodies_m: FloatArray) -> Pose2 | None:
         """Where a command leads, straight or on the spot; None where it closes in on something."""
@@ -172,16 +173,13 @@ class MakeRoom:
         if self._least_m(moved[1:], nothing_m) < min(WALL_M, self._least_m(moved[:1], nothing_m)):
             return None
         closes = drive_closes_in(
-            pose.x_m,
-            pose.y_m,
-            pose.theta_rad,
+            (pose.x_m, pose.y_m, pose.theta_rad),
             v_m_s,
             w_rad_s,
             holds_s,
             self._braking_m_s2,
             holds_s / (POSES - 1),
-            self._corners_m,
-            self._radius_m,
+            self._outline,
             np.ascontiguousarray(bodies_m[None]),
             WALL_M,
         )

@@ -57,7 +57,7 @@ class OwnHalf:
         unexplained: UnexplainedReturns | None,
         walls: tuple[hybrid.Car, Space],
     ) -> None:
-        self._config, self._footprint = config, robot.footprint
+        self._config, self._outline = config, robot.footprint.outline
         motion = robot.motion
         self._braking_m_s2 = min(motion.braking_m_s2, motion.top_speed_m_s / robot.dt_s)
         lidars = list(robot.sensors_of(LidarConfig).items())
@@ -135,9 +135,8 @@ class OwnHalf:
             car = self._car._replace(clearance=min(to_walls_m, self._car.clearance))
             clear = hybrid.poses_that_fit(placed, NEARER_M, car, self._ground)
         if len(self.seen_m):
-            outline, gap_m = self._footprint, share * self._config.gap_m
-            seen_m = pose.seen(self.seen_m)
-            clear = min(clear, poses_in_own_half(poses, outline.points_m, outline.radius_m, seen_m, gap_m))
+            gap_m, seen_m = share * self._config.gap_m, pose.seen(self.seen_m)
+            clear = min(clear, poses_in_own_half(poses, self._outline, seen_m, gap_m))
         if clear == len(poses):
             return math.inf
         clear_m = float(along_m[max(clear - 1, 0)])

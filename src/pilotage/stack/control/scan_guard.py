@@ -55,8 +55,9 @@ class LaserView:
         self._arm_m, self._sure_m = math.hypot(*self.mount), sheet.sure_range_m
         # The nearest of some returns is told too near by about two deviations; a vague laser's are averaged.
         std_m = math.sqrt(sheet.range_var_m2)
-        self.margin_m, self.own_m = max(TOUCH_M - 2.0 * std_m, 0.0), OWN_M + 3.0 * std_m
-        self.same_m, self.between = SAME_STDS * std_m, sheet.beam_step_rad
+        self._between = sheet.beam_step_rad
+        margin_m, own_m, same_m = max(TOUCH_M - 2.0 * std_m, 0.0), OWN_M + 3.0 * std_m, SAME_STDS * std_m
+        self.kept = margin_m, self._between, own_m, same_m
         self._scans: list[Scan] = []
 
     def take_in(self, readings: Readings, here: tuple[float, float, float]) -> None:
@@ -80,7 +81,7 @@ class LaserView:
         found, sure_m = [], self._sure_m
         for scan in self._scans:
             x, y, _ = scan.at
-            reach_m = (within_m + self._arm_m + math.hypot(here[0] - x, here[1] - y)) * (1.0 + self.between)
+            reach_m = (within_m + self._arm_m + math.hypot(here[0] - x, here[1] - y)) * (1.0 + self._between)
             if scan.nearest_m < reach_m and scan.nearest_m < sure_m:
                 found.append((scan, min(reach_m, sure_m)))
         return found
@@ -104,7 +105,7 @@ class ScanGuard:
 
     def __init__(self, robot: RobotKnowledge) -> None:
         self._limits = robot.motion
-        self._corners_m, self._radius_m = robot.footprint.points_m, robot.footprint.radius_m
+        self._outline, self._radius_m = robot.footprint.outline, robot.footprint.radius_m
         motion = robot.motion
         self._braking_m_s2 = min(motion.braking_m_s2, motion.top_speed_m_s / robot.dt_s)
         self._slowing_rad_s2 = min(motion.turn_acceleration_rad_s2, motion.top_turn_rate_rad_s / robot.dt_s)
@@ -176,12 +177,8 @@ class ScanGuard:
                 _since(scan.at, here),
                 move,
                 pieces,
-                self._corners_m,
-                self._radius_m,
-                laser.margin_m,
-                laser.between,
-                laser.own_m,
-                laser.same_m,
+                self._outline,
+                laser.kept,
             ):
                 break
         else:

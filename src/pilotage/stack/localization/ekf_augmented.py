@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from pydantic import Field
 
@@ -55,14 +53,6 @@ class EkfAugmentedConfig(LandmarkFilterConfig):
     """The landmark filter's parameters, and what is believed of the systematic errors."""
 
     systematic: SystematicErrors = SystematicErrors()
-
-
-@dataclass(frozen=True, slots=True)
-class SystematicEstimate:
-    """Distance scale, angle scale, angle bias (rad/s) and bearing offset (rad), with covariance (4, 4)."""
-
-    values: FloatArray
-    cov: FloatArray
 
 
 @LOCALIZERS.add(NAME, EkfAugmentedConfig)
@@ -132,12 +122,6 @@ class EkfAugmentedLocalizer(LandmarkFilter):
         belief = super().step(readings)
         self._tell_errors()
         return belief
-
-    @property
-    def systematic(self) -> SystematicEstimate:
-        """What is believed of the systematic errors."""
-        n = augmented.POSE
-        return SystematicEstimate(self._pose[n:].copy(), self._cov[n:, n:].copy())
 
     def _tell_errors(self) -> None:
         """The systematic errors with their standard deviations, one after the other."""

@@ -8,7 +8,7 @@ import numpy as np
 import scipy
 
 from pilotage.core.errors import InputError
-from pilotage.core.types import BoolArray, FloatArray
+from pilotage.core.types import BoolArray, FloatArray, Pose2
 from pilotage.kernels.filters import particles
 from pilotage.kernels.grids.marks import marked_at
 from pilotage.maps.known_maps import OncePerMap
@@ -112,24 +112,13 @@ class LikelihoodField:
 
     def log_likelihoods(self, points: FloatArray, poses: FloatArray) -> FloatArray:
         """(N,) of a scan's end points (K, 2) in the robot's frame, seen from each of the poses (N, 3)."""
-        out, field = np.empty(poses.shape[0]), self._nearest
-        particles.log_likelihoods(
-            poses,
-            points,
-            field.index,
-            *field.origin_xy_m,
-            field.resolution_m,
-            field.items,
-            self._table,
-            self._step_m,
-            out,
-        )
-        return out
+        nodes, table = self._nearest.nodes, self._table
+        found: FloatArray = particles.log_likelihoods(poses, points, nodes, table, self._step_m)
+        return found
 
     def log_densities(self, points: FloatArray, pose: FloatArray) -> FloatArray:
         """(K,) of each of a scan's end points (K, 2) in the robot's frame, from a pose (3,)."""
-        c, s = math.cos(pose[2]), math.sin(pose[2])
-        away = self._nearest.at(pose[:2] + points @ np.array([[c, s], [-s, c]]))
+        away = self._nearest.at(Pose2.from_array(pose).placed(points))
         entries = np.minimum(away / self._step_m + 0.5, len(self._table) - 1.0)
         return np.asarray(self._table[entries.astype(np.int64)])
 
@@ -155,8 +144,7 @@ class LikelihoodField:
         """
         if self._known is None or not len(points):
             return points
-        c, s = math.cos(pose[2]), math.sin(pose[2])
-        mapped = self.known_at(pose[:2] + points @ np.array([[c, s], [-s, c]]))
+        mapped = self.known_at(Pose2.from_array(pose).placed(points))
         return np.ascontiguousarray(points[mapped & (mapped.mean() >= LEAST_MAPPED)])
 
     def known_at(self, points: FloatArray) -> BoolArray:

@@ -54,15 +54,9 @@ class OdometryPrediction:
         model: OdometryModel,
         predict: Predict = ekf.predict,
     ) -> None:
-        def pick(own: float | None, sheet: float) -> float:
-            return var_scale * (sheet if own is None else own)
-
-        self._densities = (
-            pick(believed.distance_var_m2_per_m, sensor.distance_var_m2_per_m),
-            pick(believed.distance_var_m2_per_rad, sensor.distance_var_m2_per_rad),
-            pick(believed.angle_var_rad2_per_rad, sensor.angle_var_rad2_per_rad),
-            pick(believed.angle_var_rad2_per_m, sensor.angle_var_rad2_per_m),
-        )
+        told = believed.model_dump(include=set(OdometryNoise.model_fields), exclude_none=True)
+        densities = sensor.model_copy(update=told).densities
+        self._densities = tuple(var_scale * density for density in densities)
         self._predict = predict
         self.with_gyroscope = isinstance(believed, OdometryBelief) and believed.gyroscope
         self.exact = model is OdometryModel.EXACT_ARC

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pilotage.core.types import FloatArray, IntArray
+from pilotage.core.types import FloatArray, IntArray, Pose2
 from pilotage.kernels.lines import pose_hypotheses
 from pilotage.kernels.scans.missing import bodies_in_sight
 from pilotage.maps.segment_map import SegmentMap
@@ -47,7 +47,6 @@ class ScanFit:
         eyes_m: FloatArray = NO_EYES,
     ) -> None:
         first = float(lidar.beam_angles_rad()[0])
-        c, s = math.cos(first), math.sin(first)
         self._mount = lidar.mount
         self._expected = pose_hypotheses.Expected(
             first,
@@ -55,7 +54,7 @@ class ScanFit:
             min(max_range_m, lidar.max_range_m),
             near_m,
             beyond_m,
-            np.ascontiguousarray(eyes_m @ np.array([(c, -s), (s, c)])),
+            np.ascontiguousarray(Pose2(0.0, 0.0, first).seen(eyes_m)),
             world.segments_m,
             world.circles_m,
         )

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pilotage.core.types import FloatArray
+from pilotage.core.types import FloatArray, Pose2
 from pilotage.kernels.geometry.motion import exact_arc
 from pilotage.kernels.slam.branch_bound import NO_SEED, PASS_OVER_NONE, search_window
 from pilotage.kernels.slam.frames import between
-from pilotage.kernels.slam.match_grid import ScoreArray, max_pyramid
+from pilotage.kernels.slam.match_grid import ScoreArray, scores_of
 from pilotage.stack.localization.likelihood_field import LikelihoodField
 
 CELL_M, MOST_CELLS = 0.1, 2_000_000
@@ -95,9 +95,7 @@ class RecentScans:
         """(K, 2) the last ones in the robot's frame now."""
         seen = [np.zeros((0, 2))]
         for points, at in list(self._scans)[-last:]:
-            x, y, theta = between(self._here, at)
-            c, s = math.cos(theta), math.sin(theta)
-            seen.append(points @ np.array([[c, s], [-s, c]]) + [x, y])
+            seen.append(Pose2.from_array(between(self._here, at)).placed(points))
         return np.concatenate(seen)
 
 
@@ -121,7 +119,7 @@ class ScanSearch:
         scores = np.where(away < 2.5 * STD_M, np.exp(-0.5 * (away / STD_M) ** 2), open_score)
         grid: ScoreArray = scores.reshape(rows, columns).astype(np.float32)
         self._grid = grid
-        self._pyramid, self._margin = max_pyramid(grid, LEVELS)
+        self._scores = scores_of(grid, LEVELS, self._corner, self._cell_m)
         self._middle = np.array([0.5 * (xmin + xmax), 0.5 * (ymin + ymax), 0.0])
         self._half_m = 0.5 * max(width, height)
 
@@ -144,8 +142,7 @@ class ScanSearch:
 
     def fits_as_well(self, pose: FloatArray, points: FloatArray, best: Place) -> bool:
         """Whether points (K, 2) fit from a pose (3,) about as well as from the best place for them."""
-        c, s = math.cos(pose[2]), math.sin(pose[2])
-        placed = pose[:2] + _some_of(points) @ np.array([[c, s], [-s, c]])
+        placed = Pose2.from_array(pose).placed(_some_of(points))
         column, row = np.floor((placed - self._corner) / self._cell_m).astype(np.int64).T
         inside = (row >= 0) & (column >= 0) & (row < self._grid.shape[0]) & (column < self._grid.shape[1])
         score = float(self._grid[row[inside], column[inside]].sum()) / len(placed)
@@ -154,11 +151,7 @@ class ScanSearch:
     def _search(self, points: FloatArray, least: float, away: FloatArray) -> tuple[FloatArray, bool]:
         """(4,) of ``search_window``, and whether all was looked at."""
         best, nodes = search_window(
-            self._pyramid,
-            self._margin,
-            float(self._corner[0]),
-            float(self._corner[1]),
-            self._cell_m,
+            self._scores,
             points,
             self._middle,
             self._half_m,

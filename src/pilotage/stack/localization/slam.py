@@ -8,6 +8,7 @@ from pilotage.core.types import FloatArray, Pose2
 from pilotage.kernels.geometry.motion import turned_part
 from pilotage.kernels.slam.frames import between, composed, placed_all
 from pilotage.maps.world_map import WorldMap
+from pilotage.models.pose_graph_covariance import turns
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, OdometryIncrement, Readings
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
@@ -123,8 +124,7 @@ class SlamLocalizer:
 
     def _covariance(self, base: FloatArray) -> FloatArray:
         """In the map: the scanner's frame turned into it, and the lever from the scanner to the base."""
-        c, s = np.cos(self._frame[2]), np.sin(self._frame[2])
-        turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        turn = turns(self._frame[2])
         scanner = composed(self._frame, self._slam.pose)
         own = turn @ self._slam.pose_covariance @ turn.T
         out = carried_covariance(own, scanner, base)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from pilotage.core.types import FloatArray
+from pilotage.core.types import FloatArray, Pose2
 from pilotage.kernels.geometry.solids import Cells
 from pilotage.kernels.scans.jumps import leaps
 from pilotage.kernels.scans.trace import hidden_ends
@@ -42,10 +42,9 @@ class WallsBetween:
         spread_m = math.sqrt(cov[0, 0] + cov[1, 1])
         if self._cells is None or len(seen) < LEAST_SEEN or spread_m > MOST_SPREAD_M:
             return False
-        c, s = math.cos(mean[2]), math.sin(mean[2])
-        turn = np.array([[c, s], [-s, c]])
+        pose = Pose2.from_array(mean)
         hidden = hidden_ends(
-            mean[:2] + seen @ turn, mean[:2] + self._eyes_m @ turn, BEYOND_M + 3.0 * spread_m, *self._cells
+            pose.placed(seen), pose.placed(self._eyes_m), BEYOND_M + 3.0 * spread_m, *self._cells
         )
         self._excess = min(max(0.0, self._excess + hidden / len(seen) - USUAL_SHARE), MOST)
         return self._excess > LIMIT

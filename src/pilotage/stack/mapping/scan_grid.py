@@ -9,10 +9,6 @@ from pilotage.kernels.slam.occupancy import OddsArray, add_scan
 from pilotage.maps.occupancy_grid import OCCUPIED, OccupancyArray, OccupancyGrid
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.stack.mapping.slam.drawing import (
-    HIT_ODDS,
-    MISS_ODDS,
-    MOST_ODDS,
-    WALL_ODDS,
     grid_of,
     states_of,
 )
@@ -160,21 +156,9 @@ class ScanGrid:
         pose, ranges = self.poses[index], self._scans[index]
         seen = ranges[np.isfinite(ranges)]
         self._grow(pose[:2], min(self._reach, float(seen.max()) if seen.size else 0.0) + self.resolution_m)
-        add_scan(
-            self._odds,
-            float(self.corner_xy_m[0]),
-            float(self.corner_xy_m[1]),
-            self.resolution_m,
-            pose,
-            ranges,
-            self._first,
-            self._step,
-            self._reach,
-            HIT_ODDS,
-            MISS_ODDS,
-            MOST_ODDS,
-            WALL_ODDS,
-        )
+        x, y = self.corner_xy_m.tolist()
+        grid = self._odds, x, y, self.resolution_m
+        add_scan(grid, pose, ranges, self._first, self._step, self._reach)
 
     def _grow(self, middle: FloatArray, reach_m: float) -> None:
         """Make room for what is within reach of a point."""

@@ -75,7 +75,7 @@ class ChainNavigator:
             )
         self._localizer = localizer_of(parts, "chain")
         self._config, self._robot, self._chart, self._task, self._parts = config, robot, chart, task, parts
-        self._journal, self._at, self._tolerance_m = journal, 0, task.goal_tolerance_m
+        self._journal, self._at = journal, 0
         for number in range(1, len(config.legs)):
             goal = task.goals[number - 1]
             if goal.theta_rad is None:

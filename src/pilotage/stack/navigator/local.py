@@ -24,7 +24,6 @@ from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.localization.dead_reckoning import DeadReckoningConfig, DeadReckoningLocalizer
 from pilotage.stack.localization.localizer import Abilities, Localizer
 from pilotage.stack.navigator.navigator import (
-    LocalizingNavigator,
     Parts,
     arrival_within_m,
     check_for_centre,
@@ -34,6 +33,7 @@ from pilotage.stack.navigator.navigator import (
     unexplained_of,
 )
 from pilotage.stack.navigator.plan_ahead import PlanAhead, PlanAheadConfig
+from pilotage.stack.navigator.state import LocalizingNavigator, Standing
 from pilotage.stack.navigator.wandering import Wandering
 from pilotage.stack.perception.moving_bodies import MovingBodies, MovingBodiesConfig
 
@@ -106,7 +106,7 @@ class LocalNavigator(LocalizingNavigator):
         localizer: Localizer = parts.localizer or DeadReckoningLocalizer(
             DeadReckoningConfig(), robot, chart, task.initial, journal
         )
-        super().__init__(localizer, journal)
+        super().__init__(localizer, Standing(journal))
         self._last_word = LastWord(robot)
         self._step_clear = StepClear(robot, self._last_word)
         self._wandering = Wandering(config.wander, robot, localizer, self._last_word)
@@ -151,7 +151,7 @@ class LocalNavigator(LocalizingNavigator):
             self._channel.tell(math.nan)
             alone = not (self._task.mates or self._bodies.about)
             return self._wandering.step(readings) if alone else STOP
-        if self._status is not StackStatus.RUNNING:
+        if self._standing.is_over:
             self._channel.tell(away_m)
             return STOP
         point, tolerance_m = self._goal_xy_m, self._tolerance_m
@@ -159,7 +159,7 @@ class LocalNavigator(LocalizingNavigator):
             point = self._plan.lead(readings, belief)
             away_m = self._plan.to_go_m
             if self._plan.failure:
-                self._end(readings.t_s, StackStatus.FAILED, self._plan.failure)
+                self._standing.end(readings.t_s, StackStatus.FAILED, self._plan.failure)
                 return STOP
         self._channel.tell(away_m)
         led = point != self._goal_xy_m
@@ -175,7 +175,7 @@ class LocalNavigator(LocalizingNavigator):
         # Weak brakes would carry it through the goal: it stops first, and comes back.
         there = not (led or off_rad) and (abs(self._drive.rolls_m()) <= self._task.goal_tolerance_m)
         self._tell(readings.t_s, there=there)
-        if self._status is not StackStatus.RUNNING:
+        if self._standing.is_over:
             return STOP
         mapped_m = None if self._plan is None else self._plan.mapped_m
 
@@ -187,10 +187,10 @@ class LocalNavigator(LocalizingNavigator):
     def _is_lost(self, t_s: float, belief: Belief) -> bool:
         """Whether it does not know where it is any more; before its first plan the plan waits to know."""
         knew = self._plan is None or self._plan.is_made
-        lost = knew and belief.status is BeliefStatus.LOST and self._status is StackStatus.RUNNING
+        lost = knew and belief.status is BeliefStatus.LOST and not self._standing.is_over
         if lost != self._lost:
             what = "does not know where it is" if lost else "knows where it is, goes on"
-            self._journal.say(t_s, "lost" if lost else "found", f"the robot {what}")
+            self._standing.journal.say(t_s, "lost" if lost else "found", f"the robot {what}")
         self._lost = lost
         return lost
 
@@ -201,7 +201,7 @@ class LocalNavigator(LocalizingNavigator):
             self._stood = t_s, pose
         waited = t_s - self._stood[0] >= longest_s
         if waited and not self._makes_room and self._make_room.helps(pose, mapped_m):
-            self._journal.say(t_s, "make-room", "somebody stands in the way: making room")
+            self._standing.journal.say(t_s, "make-room", "somebody stands in the way: making room")
             self._make_room.begin(t_s)
             self._makes_room = True
         if self._makes_room:
@@ -219,9 +219,9 @@ class LocalNavigator(LocalizingNavigator):
     def _tell(self, t_s: float, *, there: bool) -> None:
         word = self._drive.status
         if word == "arrived" and there:
-            self._end(t_s, StackStatus.ARRIVED, f"within {self._tolerance_m:g} m of the goal")
+            self._standing.end(t_s, StackStatus.ARRIVED, f"within {self._tolerance_m:g} m of the goal")
         elif word == "closed" and word != self._word:
-            self._journal.count("closed")
+            self._standing.journal.count("closed")
         self._word = word
 
 

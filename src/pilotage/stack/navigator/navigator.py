@@ -15,8 +15,7 @@ from pilotage.stack.control.controller import Controller
 from pilotage.stack.control.escape import Escape
 from pilotage.stack.control.local.role import LocalController
 from pilotage.stack.control.reactive import Reactive
-from pilotage.stack.interface import Belief, StackStatus
-from pilotage.stack.journal import Journal
+from pilotage.stack.interface import Belief
 from pilotage.stack.knowledge import TaskKnowledge
 from pilotage.stack.localization.heading_filter import HeadingFilter
 from pilotage.stack.localization.localizer import Abilities, Localizer
@@ -77,6 +76,15 @@ def only_goal(task: TaskKnowledge, needed_by: str) -> Goal | None:
     return task.goal
 
 
+def goal_and_planner(task: TaskKnowledge, parts: Parts, needed_by: str) -> tuple[Goal, Planner]:
+    """Both, for a navigator that plans to one goal; InputError where the mission has not."""
+    goal = only_goal(task, needed_by)
+    if goal is None or parts.planner is None:
+        absent = missing({"world.goal": goal, "stack.planner": parts.planner})
+        raise InputError(f"navigator '{needed_by}': expected world.goal and stack.planner, found {absent}")
+    return goal, parts.planner
+
+
 def turn_at_goal_rad(task: TaskKnowledge, pose: Pose2) -> float:
     """How far to turn for the last goal's heading; 0 within half its tolerance, and where any will do."""
     asked_rad = task.goals[-1].theta_rad
@@ -90,29 +98,6 @@ def turned_by(off_rad: float, top_rad_s: float) -> Twist:
     """The command that turns on the spot by so much."""
     most = min(TURN_RATE_RAD_S, top_rad_s)
     return Twist(0.0, min(max(TURN_GAIN_PER_S * off_rad, -most), most))
-
-
-class LocalizingNavigator:
-    """What navigators show of themselves: their localizer's belief, and how the task stands and why."""
-
-    def __init__(self, localizer: Localizer, journal: Journal) -> None:
-        self._localizer, self._journal = localizer, journal
-        self._status, self._reason = StackStatus.RUNNING, ""
-
-    @property
-    def belief(self) -> Belief:
-        """The localizer's belief."""
-        return self._localizer.belief
-
-    @property
-    def status(self) -> tuple[StackStatus, str]:
-        """How the task stands as the robot sees it, and why."""
-        return self._status, self._reason
-
-    def _end(self, t_s: float, status: StackStatus, why: str) -> None:
-        """Arrive or fail, and say so."""
-        self._status, self._reason = status, why
-        self._journal.say(t_s, str(status), why)
 
 
 def localizer_of(parts: Parts, needed_by: str) -> Localizer:

@@ -12,7 +12,8 @@ from pilotage.sensors.sensor import Positive
 from pilotage.stack.interface import NAVIGATORS, StackStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
-from pilotage.stack.navigator.navigator import LocalizingNavigator, Parts, localizer_of
+from pilotage.stack.navigator.navigator import Parts, localizer_of
+from pilotage.stack.navigator.state import LocalizingNavigator, Standing
 
 
 class TimedCommand(Config):
@@ -51,7 +52,7 @@ class OpenLoopNavigator(LocalizingNavigator):
         parts: Parts,
         journal: Journal,
     ) -> None:
-        super().__init__(localizer_of(parts, "open-loop"), journal)
+        super().__init__(localizer_of(parts, "open-loop"), Standing(journal))
         alone = TimedCommand(
             duration_s=config.duration_s,
             speed_m_s=config.speed_m_s,
@@ -72,6 +73,6 @@ class OpenLoopNavigator(LocalizingNavigator):
         if self._leg < len(self._ends):
             self._steps += 1
             return self._commands[self._leg]
-        if self._status is StackStatus.RUNNING:
-            self._end(readings.t_s, StackStatus.ARRIVED, "the command was carried out to its end")
+        if not self._standing.is_over:
+            self._standing.end(readings.t_s, StackStatus.ARRIVED, "the command was carried out to its end")
         return STOP

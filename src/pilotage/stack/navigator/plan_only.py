@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pilotage.core.config import Config
-from pilotage.core.errors import InputError
 from pilotage.core.types import STOP, Twist
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.readings import Readings
@@ -11,7 +10,8 @@ from pilotage.stack.interface import NAVIGATORS, StackStatus
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.navigator.global_plan import GlobalPlan
-from pilotage.stack.navigator.navigator import LocalizingNavigator, Parts, localizer_of, missing, only_goal
+from pilotage.stack.navigator.navigator import Parts, goal_and_planner, localizer_of
+from pilotage.stack.navigator.state import LocalizingNavigator, Standing
 
 
 class PlanOnlyConfig(Config):
@@ -35,21 +35,18 @@ class PlanOnlyNavigator(LocalizingNavigator):
         journal: Journal,
     ) -> None:
         del config
-        goal = only_goal(task, "plan-only")
-        if goal is None or parts.planner is None:
-            absent = missing({"world.goal": goal, "stack.planner": parts.planner})
-            raise InputError(f"navigator 'plan-only': expected world.goal and stack.planner, found {absent}")
-        super().__init__(localizer_of(parts, "plan-only"), journal)
+        goal, planner = goal_and_planner(task, parts, "plan-only")
+        super().__init__(localizer_of(parts, "plan-only"), Standing(journal))
         rng = robot.streams.stream("planner")
         least_m = robot.footprint.inner_radius_m
-        plan = GlobalPlan(parts.planner, parts.smoother, chart, rng, journal, least_m, robot, as_planned=True)
+        plan = GlobalPlan(planner, parts.smoother, chart, rng, journal, least_m, robot, as_planned=True)
         nothing = chart.walls.circles_m[:0]
         journal.result("mapped_circles_m", lambda: nothing)
         result = plan.make(0.0, self.belief.pose, goal, nothing, (plan.clearance_m,))
         if result.path is None:
-            self._end(0.0, StackStatus.FAILED, f"{result.status}: {result.reason}")
+            self._standing.end(0.0, StackStatus.FAILED, f"{result.status}: {result.reason}")
         else:
-            self._status, self._reason = StackStatus.ARRIVED, "planned"
+            self._standing.status, self._standing.reason = StackStatus.ARRIVED, "planned"
             journal.say(0.0, "plan", f"{journal.plans[-1].length_m:.2f} m, nobody drives it")
 
     def step(self, readings: Readings) -> Twist:

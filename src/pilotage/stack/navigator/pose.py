@@ -18,7 +18,6 @@ from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge, TaskKnowledge
 from pilotage.stack.navigator.navigator import (
     AROUND,
-    LocalizingNavigator,
     Parts,
     arrival_within_m,
     localizer_of,
@@ -26,6 +25,7 @@ from pilotage.stack.navigator.navigator import (
     turn_at_goal_rad,
     turned_by,
 )
+from pilotage.stack.navigator.state import LocalizingNavigator, Standing
 
 
 class PoseConfig(PolarPoseConfig):
@@ -60,7 +60,7 @@ class PoseNavigator(LocalizingNavigator):
         goal = only_goal(task, "pose")
         if goal is None or goal.theta_rad is None:
             raise InputError("navigator 'pose': expected world.goal with theta_rad, found none")
-        super().__init__(localizer_of(parts, "pose"), journal)
+        super().__init__(localizer_of(parts, "pose"), Standing(journal))
         pose = Pose2(goal.x_m, goal.y_m, goal.theta_rad)
         self._law = PolarPoseController(config, pose, robot.motion, robot.dt_s)
         self._tolerance_m = arrival_within_m(config.arrival_m, task.goal_tolerance_m)
@@ -77,14 +77,16 @@ class PoseNavigator(LocalizingNavigator):
         return self._last_word.leaving(self._command(readings, pose, to_go_m))
 
     def _command(self, readings: Readings, pose: Pose2, to_go_m: float) -> Twist:
-        if self._status is not StackStatus.RUNNING:
+        if self._standing.is_over:
             return STOP
         self._is_there |= to_go_m <= self._tolerance_m
         if self._is_there:
             turn = self._turn(pose)
             if turn is not None and self._last_word.allows(turn):
                 return turn
-            self._end(readings.t_s, StackStatus.ARRIVED, f"within {self._tolerance_m:g} m of the goal")
+            self._standing.end(
+                readings.t_s, StackStatus.ARRIVED, f"within {self._tolerance_m:g} m of the goal"
+            )
             return STOP
         twist = self._law.command(pose.x_m, pose.y_m, pose.theta_rad)
         if not math.isfinite(twist.w_rad_s):
@@ -92,7 +94,7 @@ class PoseNavigator(LocalizingNavigator):
         if self._last_word.allows(twist):
             return twist
         if self._last_word.held_s >= self._patience_s:
-            self._end(readings.t_s, StackStatus.FAILED, f"stuck: {self._last_word.why}{AROUND}")
+            self._standing.end(readings.t_s, StackStatus.FAILED, f"stuck: {self._last_word.why}{AROUND}")
         return STOP
 
     def _turn(self, pose: Pose2) -> Twist | None:

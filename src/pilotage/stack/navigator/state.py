@@ -1,4 +1,4 @@
-"""What navigators that are state machines share: their states, and what they show of themselves."""
+"""What navigators show of themselves, and what those that are state machines share."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Ended:
 
 
 class Standing:
-    """How the task stands as the robot sees it, and why: part of what its states share."""
+    """How the task stands as the robot sees it, and why: part of what its states share, if it has any."""
 
     def __init__(self, journal: Journal) -> None:
         self.journal = journal
@@ -47,9 +47,14 @@ class Standing:
         self.status, self.reason = status, why
         self.journal.say(t_s, str(status), why)
 
+    @property
+    def is_over(self) -> bool:
+        """Whether it has arrived or failed."""
+        return self.status is not StackStatus.RUNNING
 
-class StateMachine:
-    """What such a navigator shows of itself: its localizer's belief, and how the task stands."""
+
+class LocalizingNavigator:
+    """What navigators show of themselves: their localizer's belief, and how the task stands."""
 
     def __init__(self, localizer: Localizer, standing: Standing) -> None:
         self._localizer, self._standing = localizer, standing

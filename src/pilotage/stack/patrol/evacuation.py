@@ -181,7 +181,7 @@ class Evacuation:
         # Down the field of times from the robot: backwards.
         x, y = self._nodes[best].tolist()
         steps = math.ceil(4.0 * AROUND_M / STEP_M)
-        back = eikonal.way_down(x, y, time, time, self._x0, self._y0, self._step_m, STEP_M, steps)
+        back = eikonal.way_down(x, y, (time, self._x0, self._y0, self._step_m), time, STEP_M, steps)
         return np.concatenate([here[None], back[::-1, :2]])
 
     def _away_m(self, line_xy_m: FloatArray) -> FloatArray:

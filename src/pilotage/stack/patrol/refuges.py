@@ -57,7 +57,7 @@ def way_out(
         return None
     mouth = places[best]
     x, y = mouth.tolist()
-    inwards = eikonal.descent(x, y, time, *roadmap.origin_xy_m, roadmap.spacing_m)
+    inwards = eikonal.descent(x, y, roadmap.placed(time))
     return WayOut(float(ends[best]), mouth, -np.array(inwards))
 
 

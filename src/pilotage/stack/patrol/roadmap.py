@@ -14,6 +14,7 @@ import scipy
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.kernels.control import eikonal
+from pilotage.kernels.geometry.field import Field
 from pilotage.maps.known_maps import OncePerMap
 from pilotage.maps.world_map import WorldMap
 from pilotage.stack.patrol.nodes import Ground
@@ -226,10 +227,7 @@ class Roadmap:
         """The vertex that is reached soonest from a place, of the few that are nearest as the crow flies."""
         places = self.places_xy_m[: self._vertices]
         few = np.argsort(np.hypot(places[:, 0] - x_m, places[:, 1] - y_m), kind="stable")[:NEAREST]
-        times = [
-            eikonal.value_at(x_m, y_m, self.time_s(int(k)), *self.origin_xy_m, self.spacing_m, 0.0)
-            for k in few
-        ]
+        times = [eikonal.value_at(x_m, y_m, self.placed(self.time_s(int(k))), 0.0) for k in few]
         return int(few[int(np.argmin(times))])
 
     def longest_s(self, place: int) -> float:
@@ -264,6 +262,10 @@ class Roadmap:
         eikonal.sweep_down(field, slow, self.spacing_m)
         return field
 
+    def placed(self, values: FloatArray) -> Field:
+        """Values (rows, columns) at its nodes, and where these are."""
+        return values, *self.origin_xy_m, self.spacing_m
+
     def slowness_for(self, clearance_m: float) -> FloatArray:
         """(rows, columns) the same for another body, which keeps so much from walls; worked out once for it.
 
@@ -294,9 +296,7 @@ class Roadmap:
     def way(self, x_m: float, y_m: float, time_s: FloatArray, reach_m: float) -> FloatArray:
         """(N, 3) places every ``STEP_M`` down a field, and half the width of the passage at each."""
         steps = math.ceil(reach_m / STEP_M)
-        return eikonal.way_down(
-            x_m, y_m, time_s, self.room_m, *self.origin_xy_m, self.spacing_m, STEP_M, steps
-        )
+        return eikonal.way_down(x_m, y_m, self.placed(time_s), self.room_m, STEP_M, steps)
 
     def narrowest_m(
         self, x_m: float, y_m: float, time_s: FloatArray, reach_m: float, soon_m: float
@@ -306,8 +306,8 @@ class Roadmap:
         Infinite off the map.
         """
         steps, few = math.ceil(reach_m / STEP_M), math.ceil(soon_m / STEP_M)
-        ground = self.room_m, self._width_m, *self.origin_xy_m, self.spacing_m
-        return eikonal.narrowest_down(x_m, y_m, time_s, *ground, STEP_M, steps, few)
+        widths_m = self.room_m, self._width_m
+        return eikonal.narrowest_down(x_m, y_m, self.placed(time_s), *widths_m, STEP_M, steps, few)
 
     def away_m(self, place: int, x_m: float, y_m: float) -> float:
         """How far a place is from another as the crow flies."""

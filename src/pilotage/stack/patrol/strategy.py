@@ -12,7 +12,7 @@ from pilotage.core.misfit import told, unfit_array
 from pilotage.core.registry import Registry
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.stack.patrol.graph import PatrolGraph
-from pilotage.stack.patrol.messages import PatrolKnowledge
+from pilotage.stack.patrol.messages import NOTHING, PatrolKnowledge
 from pilotage.stack.patrol.passages import OPEN, Passages
 
 
@@ -89,6 +89,15 @@ class Strategy(Protocol):
         Asked after every ``next_vertex``, with its answer as the target.
         """
         ...
+
+
+class Wordless:
+    """Of strategies that add nothing to what every robot tells: its visits, and where it is bound for."""
+
+    def words(self, knowledge: PatrolKnowledge) -> FloatArray:
+        """Nothing."""
+        del knowledge
+        return NOTHING
 
 
 @runtime_checkable

@@ -102,7 +102,7 @@ class MovingBodies:
         if not self._works:
             return
         self._lidar, lidar = lidars[0]
-        self._mount, self._step = lidar.mount, lidar.beam_step_rad
+        self._step = lidar.beam_step_rad
         angles = lidar.beam_angles_rad()
         self._field = lidar.mount.theta_rad + float(angles[0]), lidar.mount.theta_rad + float(angles[-1])
         self._reach_m = min(config.reach_m, lidar.max_range_m)

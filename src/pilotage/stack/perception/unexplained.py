@@ -76,9 +76,7 @@ class UnexplainedReturns:
             self.reach_m,
             self.tolerance_m + spread_m,
             spread_rad,
-            known.distance_m,
-            *known.origin_xy_m,
-            known.resolution_m,
+            known.nodes_m,
         )
         self._asked = scan.ranges_m, belief
         self._last = Unexplained(at.x_m, at.y_m, first, spread_m, spread_rad, points, beams)

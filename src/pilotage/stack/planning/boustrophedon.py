@@ -18,7 +18,7 @@ from pilotage.stack.planning.driving_space import clearance_of, failure
 from pilotage.stack.planning.field_search import path_of_line
 from pilotage.stack.planning.node_search import line_length_m
 from pilotage.stack.planning.plan_status import PlanStatus
-from pilotage.stack.planning.planner import PLANNERS, PlanRequest, PlanResult
+from pilotage.stack.planning.planner import PLANNERS, ConfiguredPlanner, PlanRequest, PlanResult
 from pilotage.stack.planning.sweep_changes import reshaped
 from pilotage.stack.planning.sweep_detours import completed, joined
 from pilotage.stack.planning.sweep_floor import Sought, covered, in_cells_of, rest_of, whole_floor
@@ -56,7 +56,7 @@ class BoustrophedonConfig(Config):
 
 
 @PLANNERS.add("boustrophedon", BoustrophedonConfig)
-class BoustrophedonPlanner:
+class BoustrophedonPlanner(ConfiguredPlanner[BoustrophedonConfig]):
     """From the start over the whole reachable floor to the goal, in passes beside one another.
 
     The floor is cut into cells where lines split and join, and cells are put in a good order; of both
@@ -71,14 +71,6 @@ class BoustrophedonPlanner:
 
     TAKES_LONG: ClassVar[bool] = True
     TURNS_ON_THE_SPOT: ClassVar[bool] = True
-
-    def __init__(self, config: BoustrophedonConfig) -> None:
-        self._config = config
-
-    @property
-    def clearance_m(self) -> float:
-        """Distance that it keeps from obstacles where a request names none."""
-        return self._config.clearance_m
 
     def plan(self, request: PlanRequest) -> PlanResult:
         """Sweep all that can be reached from the start, and end at the goal.

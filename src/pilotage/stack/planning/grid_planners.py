@@ -13,7 +13,7 @@ from pilotage.stack.planning.field_search import plan_over_nodes
 from pilotage.stack.planning.grid_planner import GRID_PLANNERS, GridRequest, GridResult
 from pilotage.stack.planning.grid_space import Cell, GridPath, GridSpace, Search
 from pilotage.stack.planning.plan_status import PlanStatus
-from pilotage.stack.planning.planner import PLANNERS, PlanRequest, PlanResult
+from pilotage.stack.planning.planner import PLANNERS, ConfiguredPlanner, PlanRequest, PlanResult
 
 Find: TypeAlias = Callable[[GridSpace, Cell, Cell, bool], GridPath | None]
 
@@ -31,18 +31,10 @@ class GridSearchConfig(Config):
     waypoint_spacing_m: float = Field(1.5, gt=0.0, le=1000.0)
 
 
-class _GridSearch:
+class _GridSearch(ConfiguredPlanner[GridSearchConfig]):
     """A search over cells that answers on grids and, its nodes the cells, on distance fields."""
 
     ANY_ANGLE: ClassVar[bool] = False
-
-    def __init__(self, config: GridSearchConfig) -> None:
-        self._config = config
-
-    @property
-    def clearance_m(self) -> float:
-        """Distance that it keeps from obstacles where a request names none."""
-        return self._config.clearance_m
 
     def search(self, request: GridRequest) -> GridResult:
         """Answer one query on a grid."""

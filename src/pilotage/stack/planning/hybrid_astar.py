@@ -18,7 +18,7 @@ from pilotage.stack.planning.driving_space import SPARE, failure, spaced_waypoin
 from pilotage.stack.planning.hybrid_query import STEP_CELLS, Found, Grain, HybridQuery
 from pilotage.stack.planning.outline import blocked_pose, car_of, goal_pose, ground_of, shut_for
 from pilotage.stack.planning.plan_status import PlanStatus
-from pilotage.stack.planning.planner import PLANNERS, Path, PlanRequest, PlanResult
+from pilotage.stack.planning.planner import PLANNERS, ConfiguredPlanner, Path, PlanRequest, PlanResult
 from pilotage.stack.planning.rough_path import look_around
 
 LEAST_RADIUS_M = 0.3
@@ -59,7 +59,7 @@ class HybridAstarConfig(Config):
 
 
 @PLANNERS.add("hybrid-astar", HybridAstarConfig)
-class HybridAstarPlanner:
+class HybridAstarPlanner(ConfiguredPlanner[HybridAstarConfig]):
     """Drives forwards and backwards on arcs that the car can drive, its outline clear of everything.
 
     Where greed finds nothing, and from an end a few steps lead nowhere, smaller ones lead out of there: from
@@ -71,14 +71,6 @@ class HybridAstarPlanner:
     """
 
     FOR_OUTLINE: ClassVar[bool] = True
-
-    def __init__(self, config: HybridAstarConfig) -> None:
-        self._config = config
-
-    @property
-    def clearance_m(self) -> float:
-        """What it keeps between outline and obstacles."""
-        return self._config.clearance_m
 
     def plan(self, request: PlanRequest) -> PlanResult:
         """Answer one query; without an outline the robot is a point."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -157,6 +157,28 @@ class Planner(Protocol):
 
     def plan(self, request: PlanRequest) -> PlanResult:
         """Answer one query; never raises for what can fail in the field."""
+
+
+class _Clearing(Protocol):
+    """A config that says what is kept."""
+
+    @property
+    def clearance_m(self) -> float: ...
+
+
+C = TypeVar("C", bound=_Clearing)
+
+
+class ConfiguredPlanner(Generic[C]):
+    """Of planners whose config says what they keep from obstacles where a request names no clearance."""
+
+    def __init__(self, config: C) -> None:
+        self._config = config
+
+    @property
+    def clearance_m(self) -> float:
+        """As the config has it."""
+        return self._config.clearance_m
 
 
 def outline_clearance_m(planner: Planner, outline: Footprint | None, as_planned: bool) -> float | None:

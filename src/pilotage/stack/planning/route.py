@@ -27,7 +27,7 @@ from pilotage.stack.planning.driving_space import (
     spaced_waypoints,
 )
 from pilotage.stack.planning.plan_status import PlanStatus
-from pilotage.stack.planning.planner import PLANNERS, Path, PlanRequest, PlanResult
+from pilotage.stack.planning.planner import PLANNERS, ConfiguredPlanner, Path, PlanRequest, PlanResult
 
 MOST_STATES = 5_000_000
 """Of which a route is checked, ``CHECK_SPACING_M`` apart: 50 km. A typing error is no road to the moon."""
@@ -63,7 +63,7 @@ class _DoesNotFitError(Exception):
 
 
 @PLANNERS.add("route", RouteConfig)
-class RoutePlanner:
+class RoutePlanner(ConfiguredPlanner[RouteConfig]):
     """Follows a programmed route; says where it does not keep its clearance instead of avoiding it.
 
     Raises
@@ -74,7 +74,7 @@ class RoutePlanner:
     """
 
     def __init__(self, config: RouteConfig) -> None:
-        self._config = config
+        super().__init__(config)
         self._points = np.array(config.points_m, dtype=np.float64)
         length_m = float(np.hypot(*np.diff(self._points, axis=0).T).sum())
         most_m = MOST_STATES * CHECK_SPACING_M
@@ -87,11 +87,6 @@ class RoutePlanner:
             _rounded(self._points, None, None, config)
         except _DoesNotFitError as error:
             raise InputError(f"route: {error}") from None
-
-    @property
-    def clearance_m(self) -> float:
-        """Distance that it keeps from obstacles where a request names none."""
-        return self._config.clearance_m
 
     def plan(self, request: PlanRequest) -> PlanResult:
         """Round the route's corners from the request's start to its goal and check the clearance."""
@@ -219,10 +214,9 @@ def _single_leg(
 ) -> list[_Piece]:
     """The shortest Dubins curve where nothing lies between start and goal."""
     (ax, ay), (bx, by) = points
-    if goal_heading is None:
-        word, *lengths = dubins.shortest_to_point(ax, ay, start_heading, bx, by, radius_m)
-    else:
-        word, *lengths = dubins.shortest(ax, ay, start_heading, bx, by, goal_heading, radius_m)
+    heading, free = (0.0, True) if goal_heading is None else (goal_heading, False)
+    *_, word, l0, l1, l2 = dubins.connect(ax, ay, start_heading, bx, by, heading, free, radius_m)
+    lengths = l0, l1, l2
     pieces = [
         _Piece(int(turn), radius_m, length) for turn, length in zip(dubins.TURNS[word], lengths, strict=True)
     ]
@@ -233,7 +227,7 @@ def _turn_toward(
     point: FloatArray, heading: float, target: FloatArray, radius_m: float
 ) -> tuple[_Piece, FloatArray]:
     """The arc from a pose until it looks at the target, and where that arc ends."""
-    word, arc, straight, _ = dubins.shortest_to_point(
+    *_, word, arc, straight, _ = dubins.shortest_to_point(
         point[0], point[1], heading, target[0], target[1], radius_m
     )
     if word in (dubins.LRL, dubins.RLR) or straight <= 0.0:
@@ -254,5 +248,5 @@ def _states(start: FloatArray, pieces: list[_Piece], spacing_m: float) -> FloatA
         word = dubins.RSR if piece.turn < 0 else dubins.LSL
         lengths = (0.0, piece.length_m, 0.0) if piece.turn == 0 else (piece.length_m, 0.0, 0.0)
         radius_m = piece.radius_m if piece.turn != 0 else 1.0
-        out.append(dubins.sample(x, y, th, radius_m, word, *lengths, spacing_m)[1:])
+        out.append(dubins.sample(dubins.Curve(x, y, th, radius_m, word, *lengths), spacing_m)[1:])
     return np.concatenate(out)

@@ -28,7 +28,7 @@ from pilotage.stack.planning.driving_space import (
     usual_radius_m,
 )
 from pilotage.stack.planning.plan_status import PlanStatus
-from pilotage.stack.planning.planner import PLANNERS, Path, PlanRequest, PlanResult
+from pilotage.stack.planning.planner import PLANNERS, ConfiguredPlanner, Path, PlanRequest, PlanResult
 from pilotage.stack.planning.rough_path import Around, look_around
 from pilotage.stack.planning.rrt_star import MAX_TREE_NODES, RrtStarConfig, directly
 from pilotage.stack.planning.rrt_star import search as grown
@@ -63,7 +63,7 @@ class RrtStarDubinsConfig(RrtStarConfig):
 
 
 @PLANNERS.add("rrt-star-dubins", RrtStarDubinsConfig)
-class RrtStarDubinsPlanner:
+class RrtStarDubinsPlanner(ConfiguredPlanner[RrtStarDubinsConfig]):
     """Sampling-based planner for forward driving with a turning radius (see ``kernels.rrt_star``).
 
     Asymptotically optimal with ``stop='optimize'`` (Karaman and Frazzoli 2011). Fails to find paths whose
@@ -74,14 +74,6 @@ class RrtStarDubinsPlanner:
     InputError
         From ``plan`` where the request's clearance or poses are not finite.
     """
-
-    def __init__(self, config: RrtStarDubinsConfig) -> None:
-        self._config = config
-
-    @property
-    def clearance_m(self) -> float:
-        """Distance that it keeps from obstacles where a request names none."""
-        return self._config.clearance_m
 
     def outline_clearance_m(self, outline: Footprint) -> float:
         """What it keeps beside the outline itself where that is driven along the very path."""
@@ -144,18 +136,15 @@ class RrtStarDubinsPlanner:
         """The shortest Dubins curve to the goal where it is free: no tree finds a better path."""
         goal = request.goal
         x, y, th = request.start.x_m, request.start.y_m, request.start.theta_rad
-        if goal.theta_rad is None:
-            word, l0, l1, l2 = dubins.shortest_to_point(x, y, th, goal.x_m, goal.y_m, radius_m)
-        else:
-            word, l0, l1, l2 = dubins.shortest(x, y, th, goal.x_m, goal.y_m, goal.theta_rad, radius_m)
-        curve = (x, y, th, radius_m, word, l0, l1, l2)
-        if first_blocked(dubins.sample(*curve, CHECK_SPACING_M), space, clearance_m) >= 0:
+        heading, free = (0.0, True) if goal.theta_rad is None else (goal.theta_rad, False)
+        curve = dubins.connect(x, y, th, goal.x_m, goal.y_m, heading, free, radius_m)
+        if first_blocked(dubins.sample(curve, CHECK_SPACING_M), space, clearance_m) >= 0:
             return None
-        states = dubins.sample(*curve, STATE_SPACING_M)
-        waypoints = dubins.sample(*curve, self._config.max_connection_distance_m)
+        states = dubins.sample(curve, STATE_SPACING_M)
+        waypoints = dubins.sample(curve, self._config.max_connection_distance_m)
         for poses in (states, waypoints):
             poses[:, 2] = wrap_array_to_pi(poses[:, 2])
-        return Path(states, waypoints, l0 + l1 + l2, radius_m)
+        return Path(states, waypoints, dubins.length_of(curve), radius_m)
 
     def _search(
         self, request: PlanRequest, space: Space, clearance_m: float, radius_m: float
@@ -203,12 +192,12 @@ def _extract(
     pieces = [tree.pose[nodes[:1]]]
     for node in nodes[1:]:
         curve = _edge(tree, node, radius_m)
-        if first_blocked(dubins.sample(*curve, CHECK_SPACING_M), space, clearance_m) >= 0:
+        if first_blocked(dubins.sample(curve, CHECK_SPACING_M), space, clearance_m) >= 0:
             return None, int(node)
-        pieces.append(dubins.sample(*curve, STATE_SPACING_M)[1:])
+        pieces.append(dubins.sample(curve, STATE_SPACING_M)[1:])
     last = nodes[-1]
     if len(nodes) > 1:
-        tree.pose[last, 2] = dubins.pose_at(*_edge(tree, last, radius_m), float(tree.lengths[last].sum()))[2]
+        tree.pose[last, 2] = dubins.pose_at(_edge(tree, last, radius_m), float(tree.lengths[last].sum()))[2]
     states = np.concatenate(pieces)
     states[-1] = tree.pose[last]
     states[:, 2] = wrap_array_to_pi(states[:, 2])
@@ -217,10 +206,7 @@ def _extract(
     return Path(states, waypoints, float(tree.cost[last]), radius_m), -1
 
 
-def _edge(
-    tree: rrt_tree.Tree, node: int, radius_m: float
-) -> tuple[float, float, float, float, int, float, float, float]:
-    """The curve into a node: start, radius, word and lengths."""
+def _edge(tree: rrt_tree.Tree, node: int, radius_m: float) -> dubins.Curve:
+    """The curve into a node."""
     x, y, th = tree.pose[tree.parent[node]]
-    l0, l1, l2 = tree.lengths[node]
-    return x, y, th, radius_m, int(tree.word[node]), l0, l1, l2
+    return dubins.Curve(x, y, th, radius_m, int(tree.word[node]), *tree.lengths[node])

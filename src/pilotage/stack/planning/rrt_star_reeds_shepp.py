@@ -9,7 +9,7 @@ from pydantic import Field
 from pilotage.kernels.rrt.steering import Steering
 from pilotage.sensors.sensor import NonNegative
 from pilotage.stack.planning.driving_space import clearance_of, usual_radius_m
-from pilotage.stack.planning.planner import PLANNERS, PlanRequest, PlanResult
+from pilotage.stack.planning.planner import PLANNERS, ConfiguredPlanner, PlanRequest, PlanResult
 from pilotage.stack.planning.rrt_star import RrtStarConfig
 from pilotage.stack.planning.rrt_star_outline import plan_for_outline
 
@@ -30,7 +30,7 @@ class RrtStarReedsSheppConfig(RrtStarConfig):
 
 
 @PLANNERS.add("rrt-star-reeds-shepp", RrtStarReedsSheppConfig)
-class RrtStarReedsSheppPlanner:
+class RrtStarReedsSheppPlanner(ConfiguredPlanner[RrtStarReedsSheppConfig]):
     """Sampling-based planner for driving forwards and backwards with a turning radius, on the true outline.
 
     Anytime, and with ``stop='optimize'`` ever cheaper (see ``kernels.rrt.outline_star``). Without an outline
@@ -43,14 +43,6 @@ class RrtStarReedsSheppPlanner:
     """
 
     FOR_OUTLINE: ClassVar[bool] = True
-
-    def __init__(self, config: RrtStarReedsSheppConfig) -> None:
-        self._config = config
-
-    @property
-    def clearance_m(self) -> float:
-        """What it keeps between outline and obstacles."""
-        return self._config.clearance_m
 
     def plan(self, request: PlanRequest) -> PlanResult:
         """Answer one query."""

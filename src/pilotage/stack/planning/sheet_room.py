@@ -38,9 +38,10 @@ class SheetRoom:
 
     def __init__(self, shape: SheetShape, body_m: float, room_m: float, wide_m: float) -> None:
         self.shape, self.body_m, self.room_m, self.wide_m = shape, body_m, room_m, wide_m
-        self.rows, self.columns = shape.rows * shape.fine + 1, shape.columns * shape.fine + 1
+        rows, columns = shape.rows * shape.fine + 1, shape.columns * shape.fine + 1
         width, height = shape.fine_size_m
-        x, y = np.arange(self.columns) * width, np.arange(self.rows) * height
+        self.lattice = sheet_space.Lattice(rows, columns, width, height)
+        x, y = np.arange(columns) * width, np.arange(rows) * height
         inside_x, inside_y = np.minimum(x, shape.size_m[0] - x), np.minimum(y, shape.size_m[1] - y)
         self._off_sheet = np.minimum(inside_x[None, :], inside_y[:, None]) < body_m - SHEET_SLACK_M
         self.segments: FloatArray = np.zeros((0, 4))
@@ -52,15 +53,8 @@ class SheetRoom:
     def update(self, segments: FloatArray, points: FloatArray) -> None:
         """Take (S, 4) walls and (P, 2) points for what stands around."""
         self.segments, self.points = np.ascontiguousarray(segments), np.ascontiguousarray(points)
-        width, height = self.shape.fine_size_m
         field = sheet_space.clearance_field(
-            self.rows,
-            self.columns,
-            width,
-            height,
-            self.segments,
-            self.points,
-            self.body_m + self.wide_m,
+            self.lattice, self.segments, self.points, self.body_m + self.wide_m
         )
         self._free_m = room = field - self.body_m
         snug = np.clip((self.wide_m - room) / self.wide_m, 0.0, 1.0)
@@ -69,9 +63,9 @@ class SheetRoom:
 
     def costs(self, x: float, y: float) -> tuple[FloatArray, IntArray]:
         """Costs to all nodes, and predecessors, from the node nearest to a point."""
-        width, height = self.shape.fine_size_m
-        column = min(max(round(x / width), 0), self.columns - 1)
-        row = min(max(round(y / height), 0), self.rows - 1)
+        rows, columns, width, height = self.lattice
+        column = min(max(round(x / width), 0), columns - 1)
+        row = min(max(round(y / height), 0), rows - 1)
         factor = self._factor
         if not factor[row, column] < math.inf:
             # It stands closer to something than it would go: around it, ways out are let be.
@@ -82,7 +76,7 @@ class SheetRoom:
             )
             let_be = np.isinf(factor[window]) & (self._free_m[window] > WAY_OUT_ROOM_M)
             factor[window] = np.where(let_be, WAY_OUT_FACTOR, factor[window])
-        return travel_cost.travel_costs(factor, row * self.columns + column, width, height)
+        return travel_cost.travel_costs(factor, row * columns + column, width, height)
 
     def stands(self, wanted: BoolArray, overhang_m: float, keep_off_m: float, steps: int = 12) -> FloatArray:
         """(rows, columns, 4) where to stand in the wanted cells; see ``kernels.sheet_space.best_stands``."""
@@ -100,33 +94,13 @@ class SheetRoom:
 
     def entry(self, cost: FloatArray, x: float, y: float) -> int:
         """The node by which to come to a point, -1 for none."""
-        return int(
-            frontier_goal.entry_node(
-                cost,
-                self.rows,
-                self.columns,
-                *self.shape.fine_size_m,
-                x,
-                y,
-                3,
-                self.body_m + self.room_m,
-                self.segments,
-                self.points,
-            )
-        )
+        clearance_m, around = self.body_m + self.room_m, (self.segments, self.points)
+        return int(frontier_goal.entry_node(cost, self.lattice, x, y, clearance_m, *around))
 
     def path(self, parent: IntArray, node: int, start: Point, end: Point | None) -> list[Point]:
         """Straight pieces from a point by a node to another point."""
-        path = frontier_goal.straightened(
-            parent,
-            node,
-            self.columns,
-            *self.shape.fine_size_m,
-            *start,
-            self.body_m + self.room_m + 0.006,
-            self.segments,
-            self.points,
-        )
+        clearance_m, around = self.body_m + self.room_m + 0.006, (self.segments, self.points)
+        path = frontier_goal.straightened(parent, node, self.lattice, *start, clearance_m, *around)
         points = [(float(x), float(y)) for x, y in path]
         if end is None:
             return points

@@ -38,7 +38,7 @@ class NoSmoother:
     """Returns the path as it is: the report leaves smoothing to the local planner."""
 
     def __init__(self, config: NoSmootherConfig) -> None:
-        self._config = config
+        del config
 
     def smooth(self, path: Path, request: PlanRequest, clearance_m: float) -> Path:  # noqa: ARG002
         """Return ``path`` itself."""
@@ -173,11 +173,10 @@ class _Chain:
             free = rules.goal_heading_free and i == len(kept) - 1
             x, y, th = nodes_path[i]
             gx, gy, gth = nodes_path[i + 1]
-            word, l0, l1, l2 = shortcut.connect(x, y, th, gx, gy, gth, free, rules.radius)
-            curve = (x, y, th, rules.radius, word, l0, l1, l2)
-            coarse.append(dubins.sample(*curve, STATE_SPACING_M)[1:])
-            fine.append(dubins.sample(*curve, CHECK_SPACING_M)[1:])
-            length_m += l0 + l1 + l2
+            curve = dubins.connect(x, y, th, gx, gy, gth, free, rules.radius)
+            coarse.append(dubins.sample(curve, STATE_SPACING_M)[1:])
+            fine.append(dubins.sample(curve, CHECK_SPACING_M)[1:])
+            length_m += dubins.length_of(curve)
         states = np.concatenate(coarse)
         states[-1, :2] = old.states[-1, :2]
         if not rules.goal_heading_free:

@@ -81,14 +81,8 @@ class LocalDrive:
                 odometry.angle_rad / elapsed_s,
                 odometry.lateral_m / elapsed_s,
             )
-            wheels = self._wheels
             distance_var, angle_var = increment_variances(
-                odometry.distance_m,
-                odometry.angle_rad,
-                wheels.distance_var_m2_per_m,
-                wheels.distance_var_m2_per_rad,
-                wheels.angle_var_rad2_per_rad,
-                wheels.angle_var_rad2_per_m,
+                odometry.distance_m, odometry.angle_rad, *self._wheels.densities
             )
             self._twist_vars = distance_var / elapsed_s**2, angle_var / elapsed_s**2
         self._moved_s = readings.t_s

@@ -109,7 +109,6 @@ class RollingGround:
         self._footprint: FloatArray | None = None
         self._limits: LocalLimits | None = None
         self._laser = (0, 0.0)
-        self.partners = 0
 
     def sent(self, t_s: float, command: Twist) -> None:
         """Remember a command: it is under way while the robot's delay lasts."""
@@ -294,7 +293,7 @@ class RollingGround:
             angle = min(angle, DOUBT * self._dt_s * math.sqrt(view.turn_rate_var_rad2_s2) + 1e-4)
         pose_std = np.array([position, position, angle])
         ground = self._last_ground
-        x, y, theta, self.partners = match.match_scan(
+        x, y, theta, _ = match.match_scan(
             self._pose[0],
             self._pose[1],
             self._pose[2],

@@ -14,7 +14,7 @@ from pilotage.core.memory import give_back
 from pilotage.core.types import BoolArray, FloatArray
 from pilotage.kernels.slam.frames import composed
 from pilotage.kernels.slam.slips import CHANCE
-from pilotage.models.pose_graph_covariance import JointCovariance, PoseCovariances, covariances
+from pilotage.models.pose_graph_covariance import JointCovariance, PoseCovariances, covariances, turns
 from pilotage.models.pose_graph_solver import Loss, Start, optimize
 from pilotage.stack.mapping.slam.closures import (
     COUNTING,
@@ -92,11 +92,7 @@ def track_edges(track: LocalTrack, share: float = 1.0) -> Edges:
     poses = track.poses[track.keyframes]
     count = poses.shape[0]
     relative = relative_poses(poses[:-1], poses[1:])
-    c, s = np.cos(poses[:-1, 2]), np.sin(poses[:-1, 2])
-    turn = np.zeros((count - 1, 3, 3))
-    turn[:, 0, 0] = turn[:, 1, 1] = c
-    turn[:, 0, 1], turn[:, 1, 0] = -s, s
-    turn[:, 2, 2] = 1.0
+    turn = turns(poses[:-1, 2])
     hessian = turn.transpose(0, 2, 1) @ track.hessians[1:] @ turn
     k = np.arange(count - 1)
     information = edge_information(hessian, relative[:, 2], TRACK_STD_M, TRACK_FLOOR + track.slips[1:])

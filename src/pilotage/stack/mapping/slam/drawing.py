@@ -10,10 +10,8 @@ from pilotage.kernels.slam.occupancy import OddsArray, add_scan
 from pilotage.maps.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyArray, OccupancyGrid
 from pilotage.stack.mapping.slam.earlier_map import KeyframeScans
 
-HIT_ODDS, MISS_ODDS, MOST_ODDS, SEEN_ODDS = 17, 5, 120, 4
-"""In twentieths: 0.85, -0.25, 6 at most, and beyond 0.2 a cell is known."""
-WALL_ODDS = HIT_ODDS
-"""A cell of more than one hit ends beams that nothing came back from."""
+SEEN_ODDS = 4
+"""In twentieths: beyond 0.2 a cell is known."""
 MOST_CELLS = 80_000_000
 MARGIN_M = 0.5
 
@@ -37,24 +35,18 @@ def drawn_map(
         )
     columns, rows = sides.astype(np.int64).tolist()
     odds = np.zeros((rows, columns), np.int8)
+    grid = odds, float(low[0]), float(low[1]), resolution_m
     # Beams that nothing came back from go last, when all walls stand that may have swallowed them.
     for returned in (True, False):
         for i, pose in enumerate(poses):
             ranges_m = scans.ranges_m[i, : int(scans.beams[i])]
             add_scan(
-                odds,
-                float(low[0]),
-                float(low[1]),
-                resolution_m,
+                grid,
                 pose,
                 np.where((ranges_m <= max_range_m) == returned, ranges_m, np.nan),
                 float(scans.first_angle_rad[i]),
                 float(scans.angle_step_rad[i]),
                 max_range_m,
-                HIT_ODDS,
-                MISS_ODDS,
-                MOST_ODDS,
-                WALL_ODDS,
             )
     return grid_of(odds, resolution_m, low)
 

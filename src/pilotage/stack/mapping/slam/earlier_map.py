@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pilotage.core.types import BoolArray, FloatArray, IntArray
+from pilotage.core.types import BoolArray, FloatArray, IntArray, Pose2
 from pilotage.logs.laser_log import LaserLog
 from pilotage.stack.mapping.slam.clouds import Clouds
 from pilotage.stack.mapping.slam.marginalization import without
@@ -102,8 +102,7 @@ def needed(poses: FloatArray, clouds: Clouds, last: int = 0) -> BoolArray:
     own = []
     for pose, cloud in zip(poses, (clouds[k] for k in range(len(clouds))), strict=True):
         near = cloud[np.hypot(cloud[:, 0], cloud[:, 1]) < RANGE_M, :2]
-        c, s = np.cos(pose[2]), np.sin(pose[2])
-        cells = np.floor((near @ np.array([[c, s], [-s, c]]) + pose[:2]) / CELL_M).astype(np.int64)
+        cells = np.floor(Pose2.from_array(pose).placed(near) / CELL_M).astype(np.int64)
         own.append(np.unique(cells[:, 0] * 4_000_037 + cells[:, 1]))
     names, which = np.unique(np.concatenate(own), return_inverse=True)
     seen_by = np.bincount(which, minlength=names.size)

@@ -17,6 +17,7 @@ from pilotage.kernels.slam.following import keep, look, settle, thinned
 from pilotage.kernels.slam.frames import between, carried, composed
 from pilotage.kernels.slam.local_map import (
     NOTHING_KNOWN,
+    SCALE_M,
     LocalMap,
     add_to_map,
     align_in_map,
@@ -24,16 +25,13 @@ from pilotage.kernels.slam.local_map import (
 )
 from pilotage.kernels.slam.movers import empty_views, looked_through
 from pilotage.kernels.slam.placing import (
-    ITERATIONS,
     LONG_M,
     POOR,
     POOR_AS_GUESSED,
-    REACH_M,
-    SCALE_M,
     distance,
     plausibility,
 )
-from pilotage.kernels.slam.track import Look, Track, empty_keyframes, has_room
+from pilotage.kernels.slam.track import Look, Track, Tracked, empty_keyframes, has_room
 from pilotage.kernels.slam.wheels import unknown_wheels
 from pilotage.stack.mapping.slam.config import SlamConfig
 from pilotage.stack.mapping.slam.fit import Fit
@@ -44,9 +42,6 @@ FETCHED = 64
 """After so many keyframes at most compiled code is left."""
 LEAST_ROOM = 4096
 """Points that the map of the last keyframes has room for at least."""
-PRIOR = np.diag([2.0, 2.0, 20.0])
-"""Holds the pose at the guess where the scan leaves it open, in squared residuals. More would pull every
-scan a little towards an odometry whose errors all have one sign."""
 NONE = 0.3
 """Fit over its running mean below which it is no fit at all: what hangs by so few points hangs by chance."""
 GONE, CHANGED, LEAST_ASKED = 0.1, 0.2, 40
@@ -123,6 +118,11 @@ class LocalMatcher:
         self.searched = 0
         self.lost = 0
 
+    @property
+    def tracked(self) -> Tracked:
+        """Where it has come to, as kernels take it."""
+        return Tracked(self.track, self.map_, self.views, self.found)
+
     def look(
         self, cloud: FloatArray, step: FloatArray | None, others: FloatArray, dt_s: float
     ) -> tuple[FloatArray, FloatArray, bool]:
@@ -134,7 +134,7 @@ class LocalMatcher:
         """
         led = step is not None
         step = _STANDING if step is None else step
-        return look(cloud, step, led, others, dt_s, PRIOR, self.track, self.map_, self.views, self.found)
+        return look(cloud, step, led, others, dt_s, self.tracked)
 
     def found_again(self) -> None:
         """Scans fitted: nothing is lost any more."""
@@ -153,12 +153,12 @@ class LocalMatcher:
         self._lost_s = 0.0
         told = np.array([fit.value, 0.0, fit.rms_m, fit.weight])
         led, step = step is not None, _STANDING if step is None else step
-        settle(fit.pose, fit.hessian, fit.start, told, step, led, dt_s, PRIOR, self.track)
+        settle(fit.pose, fit.hessian, fit.start, told, step, led, dt_s, self.track)
 
     def keep(self, scan: int, cloud: FloatArray, kept: FloatArray, hessian: FloatArray, led: bool) -> None:
         """Make the last scan a keyframe; as the kernel."""
         local = self._config.local_keyframes
-        keep(scan, cloud, kept, hessian, led, local, self.track, self.map_, self.views, self.keyframes)
+        keep(scan, cloud, kept, hessian, led, local, self.tracked, self.keyframes)
 
     def remember(self, kept: FloatArray, pose: FloatArray) -> None:
         """Take note of a keyframe that was fetched from ``keyframes``, unless it has no point."""
@@ -300,9 +300,7 @@ class LocalMatcher:
     ) -> Fit | None:
         if cloud.shape[0] == 0:
             return None
-        pose, hessian, fit, status = align_in_map(
-            map_ or self.map_, cloud, start, PRIOR, reach_m, REACH_M, SCALE_M, ITERATIONS, NOTHING_KNOWN
-        )
+        pose, hessian, fit, status = align_in_map(map_ or self.map_, cloud, start, reach_m, NOTHING_KNOWN)
         if status == TOO_FEW:
             return None
         pose[2] = (pose[2] + np.pi) % (2.0 * np.pi) - np.pi

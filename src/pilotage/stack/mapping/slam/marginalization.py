@@ -6,7 +6,7 @@ import numpy as np
 import scipy
 
 from pilotage.core.types import BoolArray, FloatArray, IntArray
-from pilotage.models.pose_graph_covariance import covariances
+from pilotage.models.pose_graph_covariance import covariances, turns
 from pilotage.stack.mapping.slam.uncertainty import Edges, relative_poses
 
 NEAR = 8
@@ -80,10 +80,6 @@ def _tree(
     order = np.sort(chosen)
     i, j, covariance = members[i[order]], members[j[order]], covariance[order]
     relative = relative_poses(poses[i], poses[j])
-    c, s = np.cos(relative[:, 2]), np.sin(relative[:, 2])
-    turn = np.zeros_like(covariance)  # edges hold their errors in the second pose's frame
-    turn[:, 0, 0] = turn[:, 1, 1] = c
-    turn[:, 0, 1], turn[:, 1, 0] = s, -s
-    turn[:, 2, 2] = 1.0
+    turn = turns(-relative[:, 2])  # edges hold their errors in the second pose's frame
     information = np.linalg.inv(turn @ covariance @ turn.transpose(0, 2, 1))
     return i, j, relative, 0.5 * (information + information.transpose(0, 2, 1))

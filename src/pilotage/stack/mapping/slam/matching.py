@@ -8,11 +8,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from pilotage.core.types import FloatArray
+from pilotage.kernels.arrays import read_only
 from pilotage.kernels.slam.align import TOO_FEW, align
 from pilotage.kernels.slam.branch_bound import NO_SEED, PASS_OVER_NONE, search_window
 from pilotage.kernels.slam.buckets import sort_into_buckets
 from pilotage.kernels.slam.frames import between
-from pilotage.kernels.slam.match_grid import ScoreArray
+from pilotage.kernels.slam.match_grid import Scores
 from pilotage.kernels.slam.slips import CHANCE
 from pilotage.stack.mapping.slam.local_matching import BUCKET_M
 from pilotage.stack.mapping.slam.submaps import Submap, Submaps
@@ -23,6 +24,7 @@ HIT_SCORE = 0.3
 LEAST_MEAN, RIVAL_SHARE = 0.25, 0.6
 SAME_PLACE_M, SAME_HEADING_RAD = 0.8, 0.35
 """A second answer nearer than this is the first one."""
+PRIOR = read_only(1e-3 * np.eye(3))
 ALIGN_REACH_M, ALIGN_LAST_REACH_M, ALIGN_SCALE_M = 0.4, 0.15, 0.05
 MOST_ALIGNED_M, MOST_ALIGNED_RAD = 0.25, 0.1
 """An alignment that ends farther from the place that was searched has slid along a corridor."""
@@ -69,9 +71,9 @@ def match(
     submaps: Submaps, earlier: int, later: int, predicted: FloatArray, half_m: float, half_rad: float
 ) -> Match:
     """Search a submap in the window around where the graph has it on an earlier one."""
-    pyramid = submaps.pyramid(earlier)
+    scores = submaps.scores(earlier)
     map_, moving, cell_m = submaps[earlier], submaps[later], submaps.cell_m
-    found, _ = laid(map_, pyramid, moving, cell_m, predicted, half_m, half_rad)
+    found, _ = laid(map_, scores, moving, predicted, half_m, half_rad)
     if found.score <= 0.0:
         return found
     agreement, overlap = lying(moving, cell_m, map_.fine, between(found.relative, np.zeros(3)))
@@ -83,9 +85,8 @@ def match(
 
 def laid(
     map_: Submap,
-    pyramid: tuple[ScoreArray, int],
+    scores: Scores,
     moving: Submap,
-    cell_m: float,
     predicted: FloatArray,
     half_m: float,
     half_rad: float,
@@ -112,23 +113,10 @@ def laid(
     turns = int(np.ceil(half_rad / STEP_RAD))
     points = np.ascontiguousarray(moving.coarse[:, :2])
     angles: FloatArray = STEP_RAD * np.arange(-turns, turns + 1, dtype=np.float64)
-    corner = map_.corner_xy_m
 
     def search(least: float, away: FloatArray, any_will_do: bool = False) -> tuple[FloatArray, bool]:
         best, nodes = search_window(
-            *pyramid,
-            corner[0],
-            corner[1],
-            cell_m,
-            points,
-            predicted,
-            half_m,
-            angles,
-            least,
-            away,
-            budget,
-            NO_SEED,
-            any_will_do,
+            scores, points, predicted, half_m, angles, least, away, budget, NO_SEED, any_will_do
         )
         return np.asarray(best), nodes > budget
 
@@ -139,7 +127,7 @@ def laid(
     pose, hessian, fit, status = align(
         moving.fine,
         best[:3].copy(),
-        1e-3 * np.eye(3),
+        PRIOR,
         ALIGN_REACH_M,
         ALIGN_LAST_REACH_M,
         ALIGN_SCALE_M,
@@ -149,7 +137,7 @@ def laid(
         reference,
     )
     pose[2] = (pose[2] + np.pi) % (2.0 * np.pi) - np.pi
-    agreement, overlap = lying(map_, cell_m, moving.fine, pose)
+    agreement, overlap = lying(map_, scores.cell_m, moving.fine, pose)
     slid = between(best[:3], pose)
     held = float(np.hypot(slid[0], slid[1])) < MOST_ALIGNED_M and abs(float(slid[2])) < MOST_ALIGNED_RAD
     aligned = status != TOO_FEW and held

@@ -8,6 +8,7 @@ import numpy as np
 
 from pilotage.core.types import FloatArray
 from pilotage.kernels.slam.frames import between, composed
+from pilotage.models.pose_graph_covariance import turns
 from pilotage.stack.mapping.slam.back_end import LoopCloser, Solved, refined, track_edges, weak_edges
 from pilotage.stack.mapping.slam.closures import USUAL_SLIP
 from pilotage.stack.mapping.slam.config import SlamConfig
@@ -159,8 +160,7 @@ class OnlineSlam:
         pose = composed(here, moved)
         self._path_m += float(np.hypot(moved[0], moved[1])) + TURN_AS_PATH_M * abs(float(moved[2]))
         own = SHARED_EDGES * np.linalg.inv(edge.information[0])
-        c, s = np.cos(pose[2]), np.sin(pose[2])
-        turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        turn = turns(pose[2])
         self.covariance = carried_covariance(self.covariance, here, pose) + turn @ own @ turn.T
         self.keyframe_poses = np.concatenate([self.keyframe_poses, pose[None]])
 

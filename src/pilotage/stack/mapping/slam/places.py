@@ -10,7 +10,7 @@ import scipy
 from pilotage.core.chi_square import chi_square_quantile
 from pilotage.core.types import BoolArray, FloatArray, IntArray
 from pilotage.kernels.slam.frames import composed
-from pilotage.kernels.slam.match_grid import max_pyramid
+from pilotage.kernels.slam.match_grid import scores_of
 from pilotage.models.pose_graph_covariance import covariances, relative_jacobians
 from pilotage.stack.mapping.slam.back_end import Solved
 from pilotage.stack.mapping.slam.closures import (
@@ -112,7 +112,7 @@ def places(
     cell_m = config.search_cell_m
     everything = np.arange(len(earlier))
     whole = drawn(earlier.clouds, earlier.poses, everything, np.zeros(3), cell_m)
-    pyramid = max_pyramid(whole.grid, LEVELS)
+    scores = scores_of(whole.grid, LEVELS, whole.corner_xy_m, cell_m)
     size_m = cell_m * np.array(whole.grid.shape[::-1], np.float64)
     middle = np.append(whole.corner_xy_m + 0.5 * size_m, 0.0)
     submap_m = config.submap_length_m
@@ -127,9 +127,8 @@ def places(
     for k in chosen.tolist():
         matches[k], everywhere = laid(
             whole,
-            pyramid,
+            scores,
             stretches[k],
-            cell_m,
             middle,
             0.5 * float(size_m.max()),
             np.pi,

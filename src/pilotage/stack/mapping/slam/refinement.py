@@ -14,7 +14,6 @@ from pilotage.stack.mapping.slam.uncertainty import Edges, edge_information, rel
 
 ALONG = (1, 2, 4)
 """Keyframes ahead that each one is aligned with along the path."""
-PRIOR = np.diag([0.5, 0.5, 5.0])
 LEAST_PAIRED = 0.4
 MOST_MOVED_M, MOST_MOVED_RAD = 0.35, 0.12
 PAIR_STD_M = 0.05
@@ -36,7 +35,7 @@ def neighbours(poses: FloatArray, since: int = 0) -> IntArray:
 
 def pair_edges(clouds: Clouds, poses: FloatArray, pairs: IntArray) -> Edges:
     """Align pairs (M, 2) of keyframes from where the poses have them; those that do not fit are left out."""
-    relative, hessian, fit, status = align_pairs(clouds.points, clouds.starts, poses, pairs, PRIOR)
+    relative, hessian, fit, status = align_pairs(clouds.points, clouds.starts, poses, pairs)
     relative[:, 2] = (relative[:, 2] + np.pi) % (2.0 * np.pi) - np.pi
     moved = relative_poses(relative_poses(poses[pairs[:, 0]], poses[pairs[:, 1]]), relative)
     sound = (

@@ -17,7 +17,7 @@ import numpy as np
 
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.models.pose_graph import PoseGraph
-from pilotage.models.pose_graph_covariance import PoseCovariances, covariances
+from pilotage.models.pose_graph_covariance import PoseCovariances, covariances, turns
 
 SHARED_EDGES = 2.0
 SCAN_STD_A_RESIDUAL = np.array([0.9, 0.9, 0.31])
@@ -74,14 +74,9 @@ class ScanCovariances:
         apart = first != second
         if apart.any():
             between[apart] = SHARED_EDGES * self._of_graph().relative(first[apart], second[apart])
-        turn = self.graph.poses[first, 2] - self.poses[i, 2]
-        rotation = np.tile(np.eye(3), (first.size, 1, 1))
-        rotation[:, 0, 0] = rotation[:, 1, 1] = np.cos(turn)
-        rotation[:, 0, 1], rotation[:, 1, 0] = -np.sin(turn), np.sin(turn)
+        rotation = turns(self.graph.poses[first, 2] - self.poses[i, 2])
         c, s = np.cos(self.poses[i, 2]), np.sin(self.poses[i, 2])
-        into = np.tile(np.eye(3), (first.size, 1, 1))
-        into[:, 0, 0] = into[:, 1, 1] = c
-        into[:, 0, 1], into[:, 1, 0] = s, -s
+        into = turns(-self.poses[i, 2])
         own = into @ (self.own[[i, j]] + self._of_scan()) @ into.transpose(0, 2, 1)
         d = self.poses[j] - self.poses[i]
         lever = np.tile(np.eye(3), (first.size, 1, 1))

@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from pilotage.core.types import FloatArray
+from pilotage.kernels.arrays import read_only
 from pilotage.kernels.slam.align import TOO_FEW, align
 from pilotage.kernels.slam.buckets import sort_into_buckets
 from pilotage.kernels.slam.frames import between, composed, gathered
 from pilotage.kernels.slam.pairs import LAST_REACH_M, SCALE_M
 from pilotage.kernels.slam.slips import told_by
 from pilotage.logs.laser_log import LaserLog
+from pilotage.models.pose_graph_covariance import turns
 from pilotage.stack.mapping.slam.clouds import Clouds, cloud_of
 from pilotage.stack.mapping.slam.config import SlamConfig
 from pilotage.stack.mapping.slam.tracker import LocalTrack
@@ -20,7 +22,7 @@ AROUND = 4
 """Keyframes to either side along the path that lend a scan their points."""
 BUCKET_M, REACH_M = 0.15, 0.5
 MOST_MOVED_M, MOST_MOVED_RAD = 1.0, 0.3
-PRIOR = np.diag([0.1, 0.1, 1.0])
+PRIOR = read_only(np.diag([0.1, 0.1, 1.0]))
 """Holds a scan that is being aligned where nothing else does, in squared residuals."""
 HUNG_COV = np.diag([0.02, 0.02, 0.008]) ** 2
 """Of where a scan hangs between the keyframes, beside what may have slipped between these."""
@@ -72,10 +74,7 @@ def _slipped(track: LocalTrack, poses: FloatArray) -> FloatArray:
     share = np.clip(_shares(track), 0.0, 1.0)
     ahead = np.minimum(track.owner + 1, track.keyframes.size - 1)
     slipped = (share * (1.0 - share))[:, None, None] * track.slips[ahead]
-    turn = np.zeros((share.size, 3, 3))
-    turn[:, 0, 0] = turn[:, 1, 1] = np.cos(poses[:, 2])
-    turn[:, 1, 0] = np.sin(poses[:, 2])
-    turn[:, 0, 1], turn[:, 2, 2] = -turn[:, 1, 0], 1.0
+    turn = turns(poses[:, 2])
     return np.asarray(turn @ slipped @ turn.transpose(0, 2, 1))
 
 

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections import OrderedDict
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TypeVar
 
 import numpy as np
 
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.kernels.slam.frames import gathered
-from pilotage.kernels.slam.match_grid import ScoreArray, max_pyramid, score_grid
+from pilotage.kernels.slam.match_grid import ScoreArray, Scores, score_grid, scores_of
 from pilotage.stack.mapping.slam.clouds import Clouds
 from pilotage.stack.mapping.slam.config import SlamConfig
 from pilotage.stack.mapping.slam.uncertainty import relative_poses
@@ -22,7 +24,8 @@ RANGE_M = 12.0
 STD_M, OPEN_SCORE = 0.12, -0.4
 MARGIN_M = 0.5
 LEVELS = 5
-KEPT_PYRAMIDS, KEPT_SUBMAPS = 2, 512
+T = TypeVar("T")
+KEPT_SCORES, KEPT_SUBMAPS = 2, 512
 """A submap is an eighth of a megabyte. Each round of closures looks at all of a building's again: where fewer
 are kept, most are drawn again at each look, a sixth of the time that a map takes."""
 
@@ -125,7 +128,7 @@ class Submaps:
         self._length_m = config.submap_length_m
         self._clouds, self._local = Clouds.of([]), np.zeros((0, 3))
         self._drawn: OrderedDict[int, Submap] = OrderedDict()
-        self._pyramids: OrderedDict[int, tuple[ScoreArray, int]] = OrderedDict()
+        self._scores: OrderedDict[int, Scores] = OrderedDict()
 
     def grow(self, clouds: Clouds, local: FloatArray, breaks: IntArray, ended: bool = True) -> None:
         """Cut a track that has grown; what is drawn of it stays, for the front end moves no keyframe.
@@ -145,7 +148,7 @@ class Submaps:
         for index, extent in enumerate(before):
             if index >= len(self.extents) or self.extents[index] != extent:
                 self._drawn.pop(index, None)
-                self._pyramids.pop(index, None)
+                self._scores.pop(index, None)
         self.references = np.array([extent.reference for extent in self.extents], np.int64)
         self.pieces = np.array([extent.piece for extent in self.extents], np.int64)
         self._clouds, self._local = clouds, local
@@ -153,27 +156,33 @@ class Submaps:
     def forget(self) -> None:
         """Let go of what is drawn; it is drawn again when it is asked for."""
         self._drawn.clear()
-        self._pyramids.clear()
+        self._scores.clear()
 
     def __len__(self) -> int:
         return len(self.extents)
 
     def __getitem__(self, index: int) -> Submap:
-        if index not in self._drawn:
-            extent = self.extents[index]
-            chosen = np.arange(extent.first, extent.last + 1)
-            frame = self._local[extent.reference]
-            self._drawn[index] = drawn(self._clouds, self._local, chosen, frame, self.cell_m)
-            while len(self._drawn) > KEPT_SUBMAPS:
-                self._drawn.popitem(last=False)
-        self._drawn.move_to_end(index)
-        return self._drawn[index]
+        return _kept(self._drawn, index, self._draw, KEPT_SUBMAPS)
 
-    def pyramid(self, index: int) -> tuple[ScoreArray, int]:
-        """Maxima for the search in a submap (``max_pyramid``)."""
-        if index not in self._pyramids:
-            self._pyramids[index] = max_pyramid(self[index].grid, LEVELS)
-            while len(self._pyramids) > KEPT_PYRAMIDS:
-                self._pyramids.popitem(last=False)
-        self._pyramids.move_to_end(index)
-        return self._pyramids[index]
+    def _draw(self, index: int) -> Submap:
+        extent = self.extents[index]
+        chosen = np.arange(extent.first, extent.last + 1)
+        return drawn(self._clouds, self._local, chosen, self._local[extent.reference], self.cell_m)
+
+    def scores(self, index: int) -> Scores:
+        """For the search in a submap."""
+        return _kept(self._scores, index, self._score, KEPT_SCORES)
+
+    def _score(self, index: int) -> Scores:
+        submap = self[index]
+        return scores_of(submap.grid, LEVELS, submap.corner_xy_m, self.cell_m)
+
+
+def _kept(store: OrderedDict[int, T], index: int, make: Callable[[int], T], most: int) -> T:
+    """One of those that are kept, made where it is not among them; so many at most, the last used ones."""
+    if index not in store:
+        store[index] = make(index)
+        while len(store) > most:
+            store.popitem(last=False)
+    store.move_to_end(index)
+    return store[index]

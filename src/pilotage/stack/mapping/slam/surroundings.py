@@ -9,7 +9,7 @@ import numpy as np
 
 from pilotage.core.types import FloatArray
 from pilotage.kernels.slam.branch_bound import NO_SEED, PASS_OVER_NONE, search_window
-from pilotage.kernels.slam.match_grid import ScoreArray, max_pyramid, score_grid
+from pilotage.kernels.slam.match_grid import Scores, score_grid, scores_of
 
 KEYFRAMES, LEVELS = 8, 4
 RANGE_M, CELL_M, STD_M = 12.0, 0.05, 0.07
@@ -19,19 +19,9 @@ LEAST_POINTS, MARGIN_M = 20, 0.3
 
 @dataclass(frozen=True, slots=True)
 class Surroundings:
-    """Scores of the last keyframes' points, and their maxima.
+    """Scores of the last keyframes' points."""
 
-    Attributes
-    ----------
-    pyramid, margin
-        From ``max_pyramid``.
-    corner_xy_m
-        (2,) of the grid's lower-left corner.
-    """
-
-    pyramid: ScoreArray
-    margin: int
-    corner_xy_m: FloatArray
+    scores: Scores
 
     @classmethod
     def of(cls, clouds: Sequence[FloatArray], centre: FloatArray) -> Surroundings | None:
@@ -43,7 +33,7 @@ class Surroundings:
         low, high = xy.min(axis=0) - MARGIN_M, xy.max(axis=0) + MARGIN_M
         bounds = np.concatenate([low, high])
         grid = score_grid(xy, np.zeros((1, 2)), np.array([xy.shape[0]]), bounds, CELL_M, STD_M, 0.0)
-        return cls(*max_pyramid(grid, LEVELS), low)
+        return cls(scores_of(grid, LEVELS, low, CELL_M))
 
     def best(
         self,
@@ -57,20 +47,7 @@ class Surroundings:
     ) -> FloatArray | None:
         """(4,) x, y, theta and score of where points lie best, as ``search_window``; None if nowhere."""
         best, _ = search_window(
-            self.pyramid,
-            self.margin,
-            self.corner_xy_m[0],
-            self.corner_xy_m[1],
-            CELL_M,
-            points_xy,
-            centre,
-            half_m,
-            turns_rad,
-            least,
-            away,
-            BUDGET,
-            seed,
-            False,
+            self.scores, points_xy, centre, half_m, turns_rad, least, away, BUDGET, seed, False
         )
         return np.asarray(best) if np.isfinite(best[3]) else None
 

@@ -26,7 +26,7 @@ from pilotage.stack.mapping.slam.guesses import (
     HEALED_SLIP,
     is_far,
 )
-from pilotage.stack.mapping.slam.local_matching import PRIOR, Aside, LocalMatcher
+from pilotage.stack.mapping.slam.local_matching import Aside, LocalMatcher
 from pilotage.stack.mapping.slam.odometry import NO_OTHERS, recording_of
 from pilotage.stack.mapping.slam.odometry_record import OdometryRecord, ToldByOdometry
 from pilotage.stack.mapping.slam.unknown_ground import FEW_POINTS, View
@@ -185,11 +185,7 @@ class Tracker:
                 end,
                 limits,
                 config.local_keyframes,
-                PRIOR,
-                matcher.track,
-                matcher.map_,
-                matcher.views,
-                matcher.found,
+                matcher.tracked,
                 matcher.keyframes,
                 poses,
                 owners,
@@ -355,11 +351,6 @@ class Tracker:
     def keyframes(self) -> int:
         """How many there are; a break may drop some of the last ones."""
         return len(self._keyframes)
-
-    @property
-    def lost(self) -> int:
-        """How many scans could not be aligned."""
-        return self._matcher.lost
 
     def last_step(self) -> LocalTrack:
         """Return the last two keyframes alone, without their points."""

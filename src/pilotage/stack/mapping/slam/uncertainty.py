@@ -9,6 +9,7 @@ import numpy as np
 from pilotage.core.chi_square import chi_square_quantile
 from pilotage.core.types import BoolArray, FloatArray, IntArray
 from pilotage.models.pose_graph import PoseGraph
+from pilotage.models.pose_graph_covariance import turns
 
 TRACK_STD_M = 0.03
 """What the residual of a point counts as that is aligned with keyframes along the path."""
@@ -89,11 +90,7 @@ def edge_information(
     least
         (3, 3) information that is there in any case.
     """
-    c, s = np.cos(theta_rad), np.sin(theta_rad)
-    turn = np.zeros((theta_rad.size, 3, 3))
-    turn[:, 0, 0] = turn[:, 1, 1] = c
-    turn[:, 0, 1], turn[:, 1, 0] = -s, s
-    turn[:, 2, 2] = 1.0
+    turn = turns(theta_rad)
     out: FloatArray = turn.transpose(0, 2, 1) @ hessian @ turn / std_m**2 + least
     if floor is not None:
         out = np.asarray(np.linalg.inv(np.linalg.inv(out) + floor), np.float64)

@@ -26,14 +26,14 @@ from pilotage.stack.navigator.floor_explorer.own_floor import OwnFloor
 from pilotage.stack.navigator.floor_explorer.states import Exploring, State
 from pilotage.stack.navigator.floor_explorer.targets import Targets
 from pilotage.stack.navigator.navigator import Parts, localizer_of
-from pilotage.stack.navigator.state import StateMachine
+from pilotage.stack.navigator.state import LocalizingNavigator
 
 COUNTS = ("frontiers_seen", "frontiers_left", "frontiers_given_up", "loops_sought")
 COLUMNS = {"goal_x_m": "m", "goal_y_m": "m", "frontiers": "1", "position_std_m": "m"}
 
 
 @NAVIGATORS.add("floor-frontier", FloorExplorerConfig)
-class FloorExplorer(StateMachine):
+class FloorExplorer(LocalizingNavigator):
     """Explores a floor with a laser scanner until no frontier is left that it can look at.
 
     Goes to the nearest frontier (Yamauchi, 1997), long ones a little sooner; paths are planned over seen free

@@ -18,7 +18,7 @@ from pilotage.stack.navigator.goal.finding import Lost, first_state, lose
 from pilotage.stack.navigator.goal_config import GoalNavigatorConfig
 from pilotage.stack.navigator.navigator import Parts, check_for_centre, localizer_of
 from pilotage.stack.navigator.own_map import OwnMap
-from pilotage.stack.navigator.state import Ended, State, StateMachine
+from pilotage.stack.navigator.state import Ended, LocalizingNavigator, State
 from pilotage.stack.perception.moving_bodies import MovingBodies
 
 COLUMNS = {
@@ -37,7 +37,7 @@ COLUMNS = {
 
 
 @NAVIGATORS.add("goal", GoalNavigatorConfig)
-class GoalNavigator(StateMachine):
+class GoalNavigator(LocalizingNavigator):
     """Drives to one goal or to several in order (night-watch report, chapter 4: its loop).
 
     Plans globally before the start; then at every step localizes, maps what is unexpected, follows the

@@ -18,15 +18,14 @@ from pilotage.stack.navigator.navigator import (
     Parts,
     check_finds_place,
     check_keeps_time,
+    goal_and_planner,
     localizer_of,
-    missing,
-    only_goal,
 )
-from pilotage.stack.navigator.state import Ended, StateMachine
+from pilotage.stack.navigator.state import Ended, LocalizingNavigator
 
 
 @NAVIGATORS.add("maneuver", ManeuverConfig)
-class ManeuverNavigator(StateMachine):
+class ManeuverNavigator(LocalizingNavigator):
     """Follows a plan with its changes of direction by a speed profile; the plan is made on the true outline.
 
     A robot that turns on the spot does so at the path's corners, so that it drives the very lines of a sweep.
@@ -49,13 +48,10 @@ class ManeuverNavigator(StateMachine):
         parts: Parts,
         journal: Journal,
     ) -> None:
-        goal = only_goal(task, "maneuver")
-        if goal is None or parts.planner is None:
-            absent = missing({"world.goal": goal, "stack.planner": parts.planner})
-            raise InputError(f"navigator 'maneuver': expected world.goal and stack.planner, found {absent}")
+        goal, planner = goal_and_planner(task, parts, "maneuver")
         localizer = localizer_of(parts, "maneuver")
         check_keeps_time(parts, "maneuver")
-        self._context = context = Context(config, robot, chart, task, parts, goal, parts.planner, journal)
+        self._context = context = Context(config, robot, chart, task, parts, goal, planner, journal)
         if context.plan.takes_long:
             xmin, ymin, xmax, ymax = chart.bounds_m
             corners_m = np.array([(x, y) for x in (xmin, xmax) for y in (ymin, ymax)])

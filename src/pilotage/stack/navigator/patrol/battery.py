@@ -76,8 +76,7 @@ class Battery:
         The time to go is longer than the path over the speed wherever walls are near: no path is longer than
         what it says.
         """
-        roadmap = self.roadmap
-        time = roadmap.time_s(self.station)
-        to_go_s = eikonal.value_at(pose.x_m, pose.y_m, time, *roadmap.origin_xy_m, roadmap.spacing_m, 0.0)
+        field = self.roadmap.placed(self.roadmap.time_s(self.station))
+        to_go_s = eikonal.value_at(pose.x_m, pose.y_m, field, 0.0)
         # Where the map has no floor the pose is a little off: the next one tells.
         return self.left_m - (to_go_s * self._speed_m_s if to_go_s < math.inf else 0.0)

@@ -9,14 +9,15 @@ from typing import TypeAlias
 import numpy as np
 
 from pilotage.core.types import FloatArray
-from pilotage.kernels.control import eikonal, safe_stop, voronoi_window
+from pilotage.kernels.control import eikonal, voronoi_window
+from pilotage.kernels.geometry.field import Field
 from pilotage.stack.patrol.roadmap import Roadmap
 
-NO_GATE: voronoi_window.Gate = (np.zeros((2, 2)), 0.0, 0.0, 1.0, 0.0, 0.0, -1.0, 0.0)
+NO_GATE: voronoi_window.Gate = ((np.zeros((2, 2)), 0.0, 0.0, 1.0), 0.0, 0.0, -1.0, 0.0)
 THROUGH_RAD = 1.75
 """It drives through a place where it turns by no more than this."""
 
-Around: TypeAlias = Callable[[FloatArray], safe_stop.Field]
+Around: TypeAlias = Callable[[FloatArray], Field]
 """A field of the roadmap led around who is in the way."""
 
 
@@ -38,17 +39,16 @@ def gate_at(
     turn_s_per_rad
         What a turn costs.
     """
-    origin, spacing = roadmap.origin_xy_m, roadmap.spacing_m
     x, y = at.tolist()
     on = roadmap.time_s(then)
-    away = eikonal.descent(x, y, on, *origin, spacing)
-    back = eikonal.descent(x, y, roadmap.time_s(came_from), *origin, spacing)
+    away = eikonal.descent(x, y, roadmap.placed(on))
+    back = eikonal.descent(x, y, roadmap.placed(roadmap.time_s(came_from)))
     turn_rad = math.acos(min(1.0, max(-1.0, -away[0] * back[0] - away[1] * back[1])))
     if turn_rad > THROUGH_RAD:
         return NO_GATE
     field = around(on)
-    left_s = eikonal.value_at(x, y, *field, 0.0)
+    left_s = eikonal.value_at(x, y, field, 0.0)
     if not math.isfinite(left_s):
         return NO_GATE
     # The turn is to be made, sooner or later: who puts it off has not been spared it.
-    return *field, x, y, near_m, left_s + turn_s_per_rad * turn_rad
+    return field, x, y, near_m, left_s + turn_s_per_rad * turn_rad

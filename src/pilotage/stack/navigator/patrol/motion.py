@@ -8,6 +8,7 @@ import numpy as np
 
 from pilotage.core.types import STOP, FloatArray, Pose2, Twist
 from pilotage.kernels.control import disc_returns, eikonal, safe_stop, voronoi_window
+from pilotage.kernels.geometry.field import Field
 from pilotage.models.motion.motion import MotionConfig
 from pilotage.stack.navigator.patrol.gate import NO_GATE, gate_at
 from pilotage.stack.navigator.patrol.onward import Onward
@@ -152,9 +153,9 @@ class Motion:
         known. Between two scans the last command stands. Who goes ``first`` drives on towards mates who talk.
         """
         senses, roadmap, config = self._senses, self.roadmap, self._senses.config
-        pose, (x0, y0) = senses.pose, roadmap.origin_xy_m
+        pose = senses.pose
         # Also between scans: the way to another vertex is not measured by what was left to the last one.
-        self.to_go_s = eikonal.value_at(pose.x_m, pose.y_m, time, x0, y0, roadmap.spacing_m, 0.0)
+        self.to_go_s = eikonal.value_at(pose.x_m, pose.y_m, roadmap.placed(time), 0.0)
         if not senses.fresh:
             return self.command
         room_m = self.room_ahead_m(time)[1]
@@ -191,14 +192,14 @@ class Motion:
     ) -> tuple[float, float, bool]:
         """Speed, turn rate, and whether it stays where it is: down a field, around discs (M, 3)."""
         senses, pose = self._senses, self._senses.pose
-        (x0, y0), spacing = self.roadmap.origin_xy_m, self.roadmap.spacing_m
+        field = self.roadmap.placed(time)
         if len(discs):
-            dx, dy = eikonal.descent(pose.x_m, pose.y_m, time, x0, y0, spacing)
+            dx, dy = eikonal.descent(pose.x_m, pose.y_m, field)
             # Who follows the field is the point to the left of the robot: so must be what it goes around.
             discs = discs + lane_m * np.array([-dy, dx, 0.0])
         gate = self.gate(at, came_from, then, discs)
         if len(discs):
-            time, x0, y0, around_s = self._detour(time, discs)
+            field, around_s = self._detour(time, discs)
             self.blocked = not around_s < self.to_go_s + NO_DETOUR_S
         v, w, status = voronoi_window.choose(
             senses.twist.v_m_s,
@@ -207,7 +208,7 @@ class Motion:
             self._limits,
             self._safety,
             (senses.near, senses.strange, self._give_way_to_nobody()),
-            (time, x0, y0, spacing),
+            field,
             gate,
             senses.field(lost=False),
             lane_m,
@@ -215,13 +216,12 @@ class Motion:
         )
         return v, w, status == voronoi_window.HELD
 
-    def _detour(self, time: FloatArray, discs: FloatArray) -> tuple[FloatArray, float, float, float]:
-        """A field around discs (M, 3), near by: the window, its origin, and the time at the robot."""
-        senses, roadmap = self._senses, self.roadmap
-        (x0, y0), spacing = roadmap.origin_xy_m, roadmap.spacing_m
+    def _detour(self, time: FloatArray, discs: FloatArray) -> tuple[Field, float]:
+        """A field around discs (M, 3), near by, and the time at the robot."""
+        senses, field = self._senses, self.roadmap.placed(time)
         x, y, reach_m = senses.pose.x_m, senses.pose.y_m, senses.config.watch_m
-        there_s, slow = THERE_RATIO * senses.task.visit_m / senses.speed_m_s, roadmap.slowness
-        return eikonal.detour(time, slow, x0, y0, spacing, x, y, reach_m, discs, DETOUR_SLACK_S, there_s)
+        there_s, slow = THERE_RATIO * senses.task.visit_m / senses.speed_m_s, self.roadmap.slowness
+        return eikonal.detour(field, slow, x, y, reach_m, discs, DETOUR_SLACK_S, there_s)
 
     def gate(
         self, at: FloatArray | None, came_from: int, then: int, discs: FloatArray
@@ -235,11 +235,8 @@ class Motion:
         if math.hypot(x - senses.pose.x_m, y - senses.pose.y_m) > near_m + horizon_s * senses.speed_m_s:
             return NO_GATE
 
-        def around(field: FloatArray) -> safe_stop.Field:
-            x0, y0 = self.roadmap.origin_xy_m
-            if len(discs):
-                field, x0, y0, _ = self._detour(field, discs)
-            return field, x0, y0, self.roadmap.spacing_m
+        def around(time: FloatArray) -> Field:
+            return self._detour(time, discs)[0] if len(discs) else self.roadmap.placed(time)
 
         return gate_at(self.roadmap, at, came_from, then, near_m, turn_s_per_rad, around)
 

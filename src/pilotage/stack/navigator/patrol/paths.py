@@ -195,15 +195,15 @@ class Paths(Senses):
         """Whether its way around bodies leads no nearer to where it drives to."""
         if self.roadmap is not self._shut:
             return False
-        grid = self.roadmap.time_s(self.hop), *self.roadmap.origin_xy_m, self.roadmap.spacing_m
-        left_s = eikonal.value_at(self.pose.x_m, self.pose.y_m, *grid, 0.0)
+        field = self.roadmap.placed(self.roadmap.time_s(self.hop))
+        left_s = eikonal.value_at(self.pose.x_m, self.pose.y_m, field, 0.0)
         return self.speed_m_s * left_s < self.roadmap.spacing_m
 
     def is_off_roadmap(self) -> bool:
         """Whether nothing leads from where it is, nor from beside it, to where it was last."""
         roadmap, (x, y) = self.roadmap, (self.pose.x_m, self.pose.y_m)
-        grid = roadmap.time_s(self.came_from), *roadmap.origin_xy_m, roadmap.spacing_m
-        return eikonal.value_at(x, y, *grid, 0.0) == math.inf and eikonal.descent(x, y, *grid) == (0.0, 0.0)
+        field = roadmap.placed(roadmap.time_s(self.came_from))
+        return eikonal.value_at(x, y, field, 0.0) == math.inf and eikonal.descent(x, y, field) == (0.0, 0.0)
 
     def without_planned_around(self, places: FloatArray) -> FloatArray:
         """Places (M, 2) but those of who is planned around: the path leads past, and nobody comes there."""

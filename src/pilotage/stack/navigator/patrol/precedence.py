@@ -225,8 +225,7 @@ def precedence(context: Context, state: State) -> State:
         context.headway.restart(context.t_s)
     elif not leads:
         roadmap, pose = context.roadmap, context.pose
-        grid = roadmap.time_s(context.hop), *roadmap.origin_xy_m, roadmap.spacing_m
-        to_go_s = eikonal.value_at(pose.x_m, pose.y_m, *grid, 0.0)
+        to_go_s = eikonal.value_at(pose.x_m, pose.y_m, roadmap.placed(roadmap.time_s(context.hop)), 0.0)
         context.headway.step(context.t_s, context.hop, to_go_s, pose.x_m, pose.y_m)
     place = orders(context, context.headway.since_s if leads else math.inf).get(context.task.robot)
     if place is not None:

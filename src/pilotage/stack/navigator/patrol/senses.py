@@ -8,7 +8,8 @@ from collections.abc import ItemsView
 import numpy as np
 
 from pilotage.core.types import STOP, FloatArray, Pose2, Twist
-from pilotage.kernels.control import disc_returns, safe_stop
+from pilotage.kernels.control import disc_returns
+from pilotage.kernels.geometry.field import Field
 from pilotage.kernels.lines import clustering
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.lidar import LidarConfig
@@ -189,10 +190,10 @@ class Senses:
             return people
         return self.strange[follows | np.isin(self.strange @ AS_ONE, people @ AS_ONE)]
 
-    def field(self, *, lost: bool) -> safe_stop.Field:
+    def field(self, *, lost: bool) -> Field:
         """Distances on its map, their origin and resolution; none where it does not know where it is."""
-        x0, y0 = self._known.origin_xy_m
-        return NO_FIELD if lost else self._known.distance_m, x0, y0, self._known.resolution_m
+        known_m, x0, y0, resolution_m = self._known.nodes_m
+        return NO_FIELD if lost else known_m, x0, y0, resolution_m
 
     def on_map(self, points: FloatArray) -> FloatArray:
         """Points (M, 2) of the base frame on the map."""

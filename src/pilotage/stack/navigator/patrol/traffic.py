@@ -280,7 +280,7 @@ def way_out(context: Context) -> int:
         narrow = roadmap.way(pose.x_m, pose.y_m, time, context.config.look_m)[:, 2] < context.pass_m
         if narrow.any() and not narrow[0]:
             continue
-        direction = eikonal.descent(pose.x_m, pose.y_m, time, *roadmap.origin_xy_m, roadmap.spacing_m)
+        direction = eikonal.descent(pose.x_m, pose.y_m, roadmap.placed(time))
         toward = float(np.max(bearings @ np.array(direction), initial=0.0))
         if toward > AT_IT:
             continue

@@ -10,8 +10,8 @@ from pydantic import Field
 from pilotage.core.config import Config
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.sensors.sensor import Positive
-from pilotage.stack.patrol.messages import NOTHING, PatrolKnowledge
-from pilotage.stack.patrol.strategy import STRATEGIES, PatrolSetting, best_of
+from pilotage.stack.patrol.messages import PatrolKnowledge
+from pilotage.stack.patrol.strategy import STRATEGIES, PatrolSetting, Wordless, best_of
 from pilotage.stack.patrol.tours import Round
 
 
@@ -47,7 +47,7 @@ class _Gains:
 
 
 @STRATEGIES.add("greedy-bayesian", BayesianConfig)
-class GreedyBayesianStrategy:
+class GreedyBayesianStrategy(Wordless):
     """GBS: the neighbour of the largest posterior gain; robots tell each other which vertices they visit."""
 
     def __init__(self, config: BayesianConfig, setting: PatrolSetting) -> None:
@@ -60,14 +60,9 @@ class GreedyBayesianStrategy:
             return knowledge.at
         return best_of(beside, self._gains.posterior(knowledge, beside), self._rng)
 
-    def words(self, knowledge: PatrolKnowledge) -> FloatArray:
-        """Nothing beyond its visits."""
-        del knowledge
-        return NOTHING
-
 
 @STRATEGIES.add("sebs", BayesianConfig)
-class SebsStrategy:
+class SebsStrategy(Wordless):
     """State exchange: as GBS, and a vertex that c other robots are bound for counts 2^(N-c) / (2^N - 1)."""
 
     def __init__(self, config: BayesianConfig, setting: PatrolSetting) -> None:
@@ -83,8 +78,3 @@ class SebsStrategy:
         count = np.array([bound_for.count(vertex) for vertex in beside.tolist()])
         state = np.where(count > 0, 2.0 ** (self._team - count) / (2.0**self._team - 1.0), 1.0)
         return best_of(beside, self._gains.posterior(knowledge, beside) * state, self._rng)
-
-    def words(self, knowledge: PatrolKnowledge) -> FloatArray:
-        """Nothing beyond its visits and where it is bound for."""
-        del knowledge
-        return NOTHING

@@ -6,8 +6,8 @@ import numpy as np
 
 from pilotage.core.config import Config
 from pilotage.core.types import FloatArray, IntArray
-from pilotage.stack.patrol.messages import NOTHING, PatrolKnowledge
-from pilotage.stack.patrol.strategy import STRATEGIES, PatrolSetting
+from pilotage.stack.patrol.messages import PatrolKnowledge
+from pilotage.stack.patrol.strategy import STRATEGIES, PatrolSetting, Wordless
 
 AHEAD = 0.25
 """Share of a neighbour's own neighbours in its prior."""
@@ -20,7 +20,7 @@ class CblsConfig(Config):
 
 
 @STRATEGIES.add("cbls", CblsConfig)
-class CblsStrategy:
+class CblsStrategy(Wordless):
     """CBLS: mean idleness, looking one edge ahead, times what was learnt of the edge; not where others go.
 
     After each decision between several neighbours the edge to the one visited least (over its degree) is
@@ -64,11 +64,6 @@ class CblsStrategy:
         self._decided = here, options, min(1.0, entropy)
         best = options[posterior >= posterior.max() - 1e-12]
         return int(best[np.argmin(self._graph.edges_m[here, best])])
-
-    def words(self, knowledge: PatrolKnowledge) -> FloatArray:
-        """Nothing beyond its visits and where it is bound for."""
-        del knowledge
-        return NOTHING
 
     def _prior(self, vertex: int, mean_s: FloatArray, taken: IntArray, all_taken: bool) -> float:
         """Mean idleness of a vertex and, less, of the idlest of its neighbours that nobody is bound for."""

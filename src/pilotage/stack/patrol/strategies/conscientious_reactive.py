@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from pilotage.core.config import Config
-from pilotage.core.types import FloatArray
-from pilotage.stack.patrol.messages import NOTHING, PatrolKnowledge
-from pilotage.stack.patrol.strategy import STRATEGIES, PatrolSetting, best_of
+from pilotage.stack.patrol.messages import PatrolKnowledge
+from pilotage.stack.patrol.strategy import STRATEGIES, PatrolSetting, Wordless, best_of
 
 
 class ConscientiousReactiveConfig(Config):
@@ -13,7 +12,7 @@ class ConscientiousReactiveConfig(Config):
 
 
 @STRATEGIES.add("conscientious-reactive", ConscientiousReactiveConfig)
-class ConscientiousReactiveStrategy:
+class ConscientiousReactiveStrategy(Wordless):
     """Knows its own visits only and looks no farther than one edge; ties are broken by lot."""
 
     def __init__(self, config: ConscientiousReactiveConfig, setting: PatrolSetting) -> None:
@@ -24,8 +23,3 @@ class ConscientiousReactiveStrategy:
         """The neighbour of the largest idleness."""
         beside = self._graph.neighbours(knowledge.at)
         return best_of(beside, knowledge.own_idleness_s[beside], self._rng) if len(beside) else knowledge.at
-
-    def words(self, knowledge: PatrolKnowledge) -> FloatArray:
-        """Nothing."""
-        del knowledge
-        return NOTHING

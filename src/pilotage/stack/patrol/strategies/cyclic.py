@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from pilotage.core.config import Config
-from pilotage.core.types import FloatArray
-from pilotage.stack.patrol.messages import NOTHING, PatrolKnowledge
-from pilotage.stack.patrol.strategy import STRATEGIES, PatrolSetting
+from pilotage.stack.patrol.messages import PatrolKnowledge
+from pilotage.stack.patrol.strategy import STRATEGIES, PatrolSetting, Wordless
 from pilotage.stack.patrol.tours import Round, spread
 
 
@@ -14,7 +13,7 @@ class CyclicConfig(Config):
 
 
 @STRATEGIES.add("cyclic", CyclicConfig)
-class CyclicStrategy:
+class CyclicStrategy(Wordless):
     """Drives to its slot of the best closed tour, waits there until all can be at theirs, then goes round.
 
     Nothing is told and nothing mended: where speeds differ, gaps drift; the share of a robot that fails is
@@ -42,8 +41,3 @@ class CyclicStrategy:
     def following(self) -> int:
         """The stop after the one that it is sent to."""
         return int(self._stops[(self._place + 1) % len(self._stops)]) if self._under_way else -1
-
-    def words(self, knowledge: PatrolKnowledge) -> FloatArray:
-        """Nothing."""
-        del knowledge
-        return NOTHING

@@ -7,8 +7,8 @@ import numpy as np
 from pilotage.core.config import Config
 from pilotage.core.types import FloatArray
 from pilotage.sensors.sensor import NonNegative
-from pilotage.stack.patrol.messages import NOTHING, PatrolKnowledge
-from pilotage.stack.patrol.strategy import STRATEGIES, PatrolSetting
+from pilotage.stack.patrol.messages import PatrolKnowledge
+from pilotage.stack.patrol.strategy import STRATEGIES, PatrolSetting, Wordless
 
 
 class DtagConfig(Config):
@@ -23,7 +23,7 @@ class DtagConfig(Config):
 
 
 @STRATEGIES.add("dtag", DtagConfig)
-class DtagStrategy:
+class DtagStrategy(Wordless):
     """DTA-Greedy: the vertex of most utility anywhere; one that another robot is bound for counts as visited.
 
     Asked on its way it keeps its target, unless a robot that is nearer to it (or has the lower number) took
@@ -49,11 +49,6 @@ class DtagStrategy:
         utility = idle_s - costs_s / self._speed_m_s
         utility[here] = -np.inf
         return int(np.argmax(utility)) if len(utility) > 1 else here
-
-    def words(self, knowledge: PatrolKnowledge) -> FloatArray:
-        """Nothing beyond its visits and where it is bound for."""
-        del knowledge
-        return NOTHING
 
     def _is_lost(self, knowledge: PatrolKnowledge) -> bool:
         """Whether somebody else will be at its target before it."""

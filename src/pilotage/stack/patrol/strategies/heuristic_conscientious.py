@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from pilotage.core.config import Config
-from pilotage.core.types import FloatArray
-from pilotage.stack.patrol.messages import NOTHING, PatrolKnowledge
-from pilotage.stack.patrol.strategy import STRATEGIES, PatrolSetting, best_of
+from pilotage.stack.patrol.messages import PatrolKnowledge
+from pilotage.stack.patrol.strategy import STRATEGIES, PatrolSetting, Wordless, best_of
 
 
 class HeuristicConscientiousConfig(Config):
@@ -13,7 +12,7 @@ class HeuristicConscientiousConfig(Config):
 
 
 @STRATEGIES.add("heuristic-conscientious", HeuristicConscientiousConfig)
-class HeuristicConscientiousStrategy:
+class HeuristicConscientiousStrategy(Wordless):
     """Adds idleness and nearness, each as a share of the largest among neighbours; its own visits only."""
 
     def __init__(self, config: HeuristicConscientiousConfig, setting: PatrolSetting) -> None:
@@ -28,8 +27,3 @@ class HeuristicConscientiousStrategy:
         idle_s, away_m = knowledge.own_idleness_s[beside], self._graph.edges_m[knowledge.at, beside]
         longest_s = max(float(idle_s.max()), 1e-9)
         return best_of(beside, 1.0 - away_m / away_m.max() + idle_s / longest_s, self._rng)
-
-    def words(self, knowledge: PatrolKnowledge) -> FloatArray:
-        """Nothing."""
-        del knowledge
-        return NOTHING

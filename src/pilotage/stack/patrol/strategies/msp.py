@@ -6,10 +6,9 @@ import numpy as np
 import scipy
 
 from pilotage.core.config import Config
-from pilotage.core.types import FloatArray
-from pilotage.stack.patrol.messages import NOTHING, PatrolKnowledge
+from pilotage.stack.patrol.messages import PatrolKnowledge
 from pilotage.stack.patrol.partition import even_sizes, partition
-from pilotage.stack.patrol.strategy import STRATEGIES, PatrolSetting
+from pilotage.stack.patrol.strategy import STRATEGIES, PatrolSetting, Wordless
 
 
 class MspPartitionConfig(Config):
@@ -17,7 +16,7 @@ class MspPartitionConfig(Config):
 
 
 @STRATEGIES.add("msp-partition", MspPartitionConfig)
-class MspPartitionStrategy:
+class MspPartitionStrategy(Wordless):
     """Goes round the best tour of its share; shares are balanced by the lengths of their tours.
 
     Robots take the shares that are near to their starts. More robots than vertices share the vertices in
@@ -45,8 +44,3 @@ class MspPartitionStrategy:
     def following(self) -> int:
         """The stop after the one that it is sent to."""
         return int(self._stops[(self._place + 1) % len(self._stops)])
-
-    def words(self, knowledge: PatrolKnowledge) -> FloatArray:
-        """Nothing."""
-        del knowledge
-        return NOTHING
