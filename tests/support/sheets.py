@@ -100,6 +100,7 @@ def sheet_knowledge(**changes: Any) -> SheetKnowledge:
         drive=WheelDriveConfig(),
         sensors=sheet_sensors(),
         dt_s=DT_S,
+        time_limit_s=600.0,
         fusion=True,
         avoidance=True,
         firmware=FirmwareConfig(),

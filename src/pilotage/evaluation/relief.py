@@ -17,12 +17,15 @@ class Relief:
 
     Attributes
     ----------
+    s_m
+        (N,) length along the path.
     elevation_m
         (N,) height there; NaN where unknown.
     grade_rad
         (N - 1,) rise of each step along the path, negative downhill.
     """
 
+    s_m: FloatArray
     elevation_m: FloatArray
     grade_rad: FloatArray
 
@@ -60,4 +63,4 @@ def relief(ground: ElevationModel, path_xy_m: FloatArray, step_m: float | None =
     heights = ground.heights_at(points)
     with np.errstate(invalid="ignore"):
         grade = np.arctan2(np.diff(heights), np.diff(at))
-    return Relief(heights, grade)
+    return Relief(at, heights, grade)

@@ -191,6 +191,7 @@ class SheetKnowledge:
     drive: WheelDriveConfig
     sensors: Mapping[str, SensorConfig]
     dt_s: float
+    time_limit_s: float
     fusion: bool
     avoidance: bool
     firmware: FirmwareConfig
@@ -234,6 +235,7 @@ class SheetKnowledge:
             drive=motion,
             sensors=robot.sensors,
             dt_s=robot.dt_s,
+            time_limit_s=task.time_limit_s,
             fusion=switches.fusion,
             avoidance=switches.avoidance,
             firmware=switches.firmware,
