@@ -70,6 +70,13 @@ def test_samples_are_spaced_and_bend_no_more_than_allowed(a: Pose, b: Pose, r: f
     assert (turned <= step_m / r + 1e-7).all()
 
 
+@given(pose, radius)
+def test_who_is_there_drives_nowhere(a: Pose, r: float) -> None:
+    """By rounding it was a whole circle, half of the time."""
+    assert length(a, a, r) == 0.0
+    assert dubins.length_of(dubins.shortest_to_point(*a, a[0], a[1], r)) == 0.0
+
+
 @given(pose, coordinate, coordinate, radius)
 def test_free_heading_is_the_least_over_all_headings(a: Pose, x: float, y: float, r: float) -> None:
     curve = dubins.shortest_to_point(*a, x, y, r)

@@ -136,6 +136,8 @@ def shortest_to_point(x0: float, y0: float, th0: float, x1: float, y1: float, ra
     An arc and its tangent through the point, or, for a point inside a turning circle, two arcs; the
     third piece is empty.
     """
+    if math.hypot(x1 - x0, y1 - y0) <= SNAP_RAD * radius:
+        return Curve(x0, y0, th0, radius, LSL, 0.0, 0.0, 0.0)  # by rounding it would be a whole circle
     best_word, best, best0, best1 = LSL, math.inf, math.inf, math.inf
     for side in (1, -1):
         cx, cy = x0 - side * radius * math.sin(th0), y0 + side * radius * math.cos(th0)
