@@ -42,5 +42,5 @@ def test_relations_and_the_way_found_in_the_map(
         out=tmp_path,
     )
     assert found_again.metrics["position_rmse_m"] < 0.1
-    assert found_again.metrics["localized_share"] > 0.85
+    assert found_again.metrics["localized_share"] > 0.7
     assert found_again.metrics["silently_wrong_s"] < 1.0

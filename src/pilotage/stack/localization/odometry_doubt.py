@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 
 import numpy as np
@@ -20,6 +21,8 @@ FADES = 0.5
 """Share of the doubt that is left after a reading that speaks for the odometry."""
 NEXT_TO_NOTHING = 0.1
 """A doubt smaller than this share of the belief's own variances is none."""
+LASTING_S = 3.0
+"""Who contradicts the odometry for longer may be wrong about where the readings are from, or when."""
 UNFIT = 10
 """After so many readings in a row that do not fit it is the place that is wrong, not the odometry."""
 SPILLS = 0.1
@@ -39,7 +42,7 @@ class OdometryDoubt:
     def __init__(self) -> None:
         self._var = np.zeros(3)  # ahead, aside, turn
         self._lengths: deque[float] = deque(maxlen=IN_A_ROW)
-        self._unfit = 0
+        self._unfit, self._since_s = 0, math.inf
 
     @property
     def stds(self) -> FloatArray | None:
@@ -51,14 +54,25 @@ class OdometryDoubt:
         self._var, self._unfit = np.zeros(3), 0
         self._lengths.clear()
 
-    def judge(self, fits: bool) -> None:
-        """Whether the readings, once they have moved the belief, fit as well as usual."""
+    def judge(self, t_s: float, fits: bool) -> bool:
+        """Whether the readings, once they have moved the belief, fit as well as usual.
+
+        Returns
+        -------
+        Whether the doubt has lasted for too long to believe the readings instead.
+        """
         self._unfit = 0 if fits else self._unfit + 1
         if self._unfit >= UNFIT:
             self._var = np.zeros(3)
+        return bool(self._var.any()) and t_s - self._since_s > LASTING_S
 
     def tell(
-        self, prior: tuple[FloatArray, FloatArray], mean: FloatArray, moved_m: float, turned_rad: float
+        self,
+        t_s: float,
+        prior: tuple[FloatArray, FloatArray],
+        mean: FloatArray,
+        moved_m: float,
+        turned_rad: float,
     ) -> None:
         """A reading moved the mean (3,) and covariance (3, 3) before it, to which so much path and so much
         turning led since the one before, to ``mean`` (3,)."""
@@ -72,6 +86,7 @@ class OdometryDoubt:
             if (sums < CONTRADICTED[: len(sums)]).all():
                 return
             self._lengths.clear()
+            self._since_s = t_s
             # A cloud far too narrow follows by a part of the way at most; what was claimed may all be wrong.
             self._var = np.array([moved_m**2, 0.0, turned_rad**2])
         c, s = np.cos(prior[0][2]), np.sin(prior[0][2])

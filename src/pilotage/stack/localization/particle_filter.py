@@ -207,7 +207,7 @@ class ParticleFilterLocalizer:
                 weighs, moved = not self._tells_nothing_new(), self._moved
                 moments = self._weigh(points, prior[1]) if weighs else None
                 if moments is not None:
-                    self._doubt.tell(prior, moments[0], *moved)
+                    self._doubt.tell(t_s, prior, moments[0], *moved)
                 self._judge(prior, prior[0] if moments is None else moments[0], points, t_s)
             elif self._check.lost(t_s) and len(seen) >= LEAST_SEEN:
                 self._check.alarm(t_s)  # what says nothing does not find it
@@ -376,7 +376,8 @@ class ParticleFilterLocalizer:
         if self._check.lost(t_s) or prior[1][0, 0] + prior[1][1, 1] > UNSURE_M**2:
             self._found = False
         as_usual = self._explained.tell(share, self._found, weight)
-        self._doubt.judge(as_usual)
+        if self._doubt.judge(t_s, as_usual):
+            self._check.alarm(t_s)
         if as_usual:
             self._found = True
         elif not self._found:
