@@ -6,17 +6,17 @@ import math
 from collections import deque
 
 import numpy as np
-import scipy
 
 from pilotage.core.angles import wrap_to_pi
+from pilotage.core.chi_square import chi_square_quantile
 from pilotage.core.types import FloatArray
 from pilotage.stack.localization.odometry_watch import TURN_AS_PATH_M
 
 IN_A_ROW = 3
 """So many readings are looked at together."""
-CONTRADICTED = scipy.special.chdtri(3.0 * np.arange(1, IN_A_ROW + 1), 1e-3)
-"""Corrections of one, two and three readings whose squared Mahalanobis lengths add up to more are no
-chance."""
+CHANCE = 0.999
+"""Corrections of one, two or three whose squared Mahalanobis lengths add up to what is less likely than that
+are no chance."""
 FADES = 0.5
 """Share of the doubt that is left after a reading that speaks for the odometry."""
 NEXT_TO_NOTHING = 0.1
@@ -42,6 +42,7 @@ class OdometryDoubt:
     def __init__(self) -> None:
         self._var = np.zeros(3)  # ahead, aside, turn
         self._lengths: deque[float] = deque(maxlen=IN_A_ROW)
+        self._longest = np.array([chi_square_quantile(CHANCE, 3 * k) for k in range(1, IN_A_ROW + 1)])
         self._unfit, self._since_s = 0, math.inf
 
     @property
@@ -83,7 +84,7 @@ class OdometryDoubt:
         if not self._var.any():
             self._lengths.appendleft(float(step @ np.linalg.solve(prior[1], step)))
             sums = np.cumsum(self._lengths)
-            if (sums < CONTRADICTED[: len(sums)]).all():
+            if (sums < self._longest[: len(sums)]).all():
                 return
             self._lengths.clear()
             self._since_s = t_s
