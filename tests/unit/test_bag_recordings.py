@@ -299,6 +299,7 @@ def test_a_bags_camera_is_calibrated_by_its_fiducials(table: Path, tmp_path: Pat
         ("localize {bag} --map museum --topic /plan", "expected one of sensor_msgs/msg/LaserScan"),
         ("localize {bag} --map museum --truth /nowhere", "expected the topic /nowhere of"),
         ("localize {bag} --map museum --start 1,1", "--start: expected X,Y,TH"),
+        ("localize {bag} --map museum --start unknwn", "or unknown, found 'unknwn'"),
         (
             "localize {bag} --map museum --start unknown --localizer dead-reckoning",
             "expected --start X,Y,TH or the truth at the begin, found neither; of a map with walls",

@@ -148,7 +148,10 @@ def _start(text: str) -> Pose2 | Literal["unknown"]:
         return "unknown"
     from pilotage.core.types import Pose2
 
-    values = parse_pose(text, "--start")
+    try:
+        values = parse_pose(text, "--start")
+    except InputError:
+        values = ()
     if len(values) != 3:
         raise InputError(f"--start: expected X,Y,TH in metres and radians, or unknown, found '{text}'")
     return Pose2(*values)
