@@ -187,11 +187,21 @@ def test_a_stream_that_was_closed_is_no_bug() -> None:
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device that is full is Linux's")
-def test_where_standard_error_is_full_the_code_tells_alone() -> None:
-    """It was that of a task that failed in the field."""
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+@pytest.mark.parametrize(
+    ("stream", "command", "code"),
+    [("stderr", "run nosuch", 2), ("stdout", "--version", 2), ("stderr", "--version", 0)],
+)
+def test_where_a_stream_is_full_the_code_tells_alone(
+    stream: str, command: str, code: int, unbuffered: str
+) -> None:
+    """It was that of a task that failed in the field; and 120, where the interpreter buffers its lines."""
+    words = [sys.executable, "-m", "pilotage", *command.split()]
+    streams = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    environment = os.environ | {"PYTHONUNBUFFERED": unbuffered}
     with Path("/dev/full").open("w") as full:
-        done = subprocess.run([sys.executable, "-m", "pilotage", "run", "nosuch"], stderr=full, check=False)
-    assert done.returncode == 2
+        done = subprocess.run(words, **(streams | {stream: full}), check=False, env=environment)  # type: ignore[call-overload]
+    assert done.returncode == code
 
 
 def test_a_folder_that_is_gone_is_told(tmp_path: Path) -> None:

@@ -65,8 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # Where even to tell of a fault there was none.
         return _without_memory()
     except BrokenPipeError:
-        # The interpreter flushes standard output once more at exit: give it somewhere to go.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _to_nowhere_if_full()
         return BROKEN_PIPE
 
 
@@ -216,4 +215,14 @@ def _say(text: str, code: int) -> int:
 
     with suppress(OSError):
         print(f"pilotage: {shown(text)}", file=sys.stderr)
+    _to_nowhere_if_full()
     return code
+
+
+def _to_nowhere_if_full() -> None:
+    """What a full device did not take is flushed once more at exit, whose failure would be the code: 120."""
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except OSError:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
