@@ -210,6 +210,22 @@ def test_wheels_that_tell_no_sign_lead_nobody_astray(seed: int) -> None:
     assert math.hypot(off[0], off[1]) < 0.05
 
 
+def test_who_stands_in_doubt_does_not_spread() -> None:
+    """Scans of one that stands are not taken in: each widened the cloud once more, while it stood."""
+    start = Pose2(6.0, 4.0, 0.0)
+    told = told_of(start=start, variances=(1e-4, 1e-4, 1e-4))
+    localizer = told.localizer(ParticleFilterLocalizer, MclConfig())
+    scan = LidarScan(np.full(539, 3.0))
+    for step in range(60):
+        if step == 20:  # it has stood for long enough
+            prior = start.as_array(), np.diag([1e-6, 1e-6, 1e-6])
+            localizer._doubt.tell(2.0, prior, prior[0] + np.array([0.1, 0.0, 0.0]), 0.0, 0.0)
+        odometry = OdometryIncrement(0.0, 0.0, 0.0)
+        belief = localizer.step(Readings(0.1 * (step + 1), {"lidar": scan, "odometry": odometry}))
+        if step > 20:
+            assert math.hypot(math.sqrt(belief.cov[0, 0]), math.sqrt(belief.cov[1, 1])) < 0.15
+
+
 def test_who_is_never_contradicted_keeps_the_belief_in_its_wheels() -> None:
     """Corrections as large as the belief says leave it alone; one beyond chance tells how far, and fades."""
     rng, doubt = np.random.default_rng(0), OdometryDoubt()

@@ -43,12 +43,16 @@ class OdometryDoubt:
         self._var = np.zeros(3)  # ahead, aside, turn
         self._lengths: deque[float] = deque(maxlen=IN_A_ROW)
         self._longest = np.array([chi_square_quantile(CHANCE, 3 * k) for k in range(1, IN_A_ROW + 1)])
-        self._unfit, self._since_s = 0, math.inf
+        self._unfit, self._since_s, self._spent = 0, math.inf, False
 
     @property
     def stds(self) -> FloatArray | None:
-        """(3,) ahead, aside and turn, per reading; None without doubt."""
-        return np.sqrt(self._var) if self._var.any() else None
+        """(3,) ahead, aside and turn, since the last reading told of; None without doubt, or once spent."""
+        return np.sqrt(self._var) if self._var.any() and not self._spent else None
+
+    def spend(self) -> None:
+        """The belief was widened: who takes in no more readings, as one that stands, does not widen on."""
+        self._spent = True
 
     def forget(self) -> None:
         """The belief begins anew."""
@@ -77,6 +81,7 @@ class OdometryDoubt:
     ) -> None:
         """A reading moved the mean (3,) and covariance (3, 3) before it, to which so much path and so much
         turning led since the one before, to ``mean`` (3,)."""
+        self._spent = False
         if self._unfit >= UNFIT:
             return
         step = mean - prior[0]

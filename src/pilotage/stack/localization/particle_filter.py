@@ -282,6 +282,7 @@ class ParticleFilterLocalizer:
         """By what the odometry is not believed."""
         stds = self._doubt.stds
         if stds is not None:
+            self._doubt.spend()
             if self._relocalization is not None:
                 self._relocalization.forget()
             ahead, aside, turn = stds[:, None] * self._rng.standard_normal((3, self._poses.shape[0]))
