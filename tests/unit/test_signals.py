@@ -155,6 +155,47 @@ def test_so_it_does_in_a_script(tmp_path: Path) -> None:
     assert (child.returncode, child.stderr) == (1, "interrupted, 1, True\n")
 
 
+LOADED = """
+import os, signal, sys
+from numba.core.codegen import CPUCodeLibrary
+from pilotage.cli import app
+from pilotage.cli.main import main
+
+handed, struck = CPUCodeLibrary._object_getbuffer_hook.__func__, []
+
+def strike(cls, module):
+    code = handed(cls, module)
+    if code is not None and "loaded_in_a_test" in module.name and not struck:
+        struck.append(None)
+        os.kill(os.getpid(), signal.SIGTERM)
+    return code
+
+def call(_):
+    from pilotage.kernels.jit import kernel
+    from kept import loaded_in_a_test
+
+    kernel(loaded_in_a_test)(1.0)
+    return 0
+
+CPUCodeLibrary._object_getbuffer_hook = classmethod(strike)
+sys.argv[1:] = ["missions"]
+app.dispatch = call
+code = main()
+sys.exit(code if struck else 3)
+"""
+
+
+def test_one_that_strikes_as_a_kept_kernel_is_loaded_waits_until_it_is(tmp_path: Path) -> None:
+    """LLVM asks for its code, takes what is raised there for none, and numba writes to address zero."""
+    (tmp_path / "kept.py").write_text("def loaded_in_a_test(x):\n    return 2.0 * x\n")
+    env = {**os.environ, "PILOTAGE_CACHE_DIR": str(tmp_path)}
+    for code, said in ((3, ""), (143, "pilotage: ended by SIGTERM\n")):
+        child = subprocess.run(
+            [sys.executable, "-c", LOADED], cwd=tmp_path, env=env, capture_output=True, text=True, check=False
+        )
+        assert (child.returncode, child.stderr) == (code, said)
+
+
 WENT_ON: list[bool] = []
 """Work that an interruption was to end came to its own end."""
 

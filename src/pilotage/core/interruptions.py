@@ -23,13 +23,15 @@ _UNGUARDED = tuple(
     str(Path(*names))
     for names in (
         ("ctypes", "__init__.py"),
+        ("llvmlite", "binding", "executionengine.py"),
         ("numba", "core", "serialize.py"),
         ("numpy", "_core", "_internal.py"),
     )
 )
 """Files of Python's that C calls functions of, and takes their being interrupted for an answer. Compiled
 kernels go on with a null pointer: they ask ``ctypes.cast`` for a random generator's functions, and numba for
-the types of what they return. NumPy takes fields that are being compared for fields that cannot be."""
+the types of what they return. LLVM takes a kept kernel that it was not handed for one without code. NumPy
+takes fields that are being compared for fields that cannot be."""
 
 
 class Terminated(KeyboardInterrupt):
