@@ -81,8 +81,9 @@ class EkfWallsLocalizer:
     nothing, until the search through the map has one pose left. So it starts without a pose, too.
 
     Fails where walls run in one direction only (the pose along them is dead reckoning then), and in a map
-    that repeats itself farther than the robot sees. Where the robot stands it takes in a few scans and only
-    judges itself by the others.
+    that repeats itself farther than the robot sees, and in a recorded building's map made walls of: they are
+    off by centimetres, its lines by millimetres, and it says that it is lost. Where the robot stands it takes
+    in a few scans and only judges itself by the others.
     """
 
     BY_COMMANDS: ClassVar[bool] = True
