@@ -43,7 +43,7 @@ class OdometryPrediction:
     var_scale
         Factor on all variances, for experiments with a filter that is wrong about its noise.
     predict
-        The arithmetic: linearized (EKF) or by points (UKF).
+        The arithmetic: linearized (EKF, if None) or by points (UKF).
     """
 
     def __init__(
@@ -52,12 +52,12 @@ class OdometryPrediction:
         believed: OdometryNoise,
         var_scale: Positive,
         model: OdometryModel,
-        predict: Predict = ekf.predict,
+        predict: Predict | None = None,
     ) -> None:
         told = believed.model_dump(include=set(OdometryNoise.model_fields), exclude_none=True)
         densities = sensor.model_copy(update=told).densities
         self._densities = tuple(var_scale * density for density in densities)
-        self._predict = predict
+        self._predict = ekf.predict if predict is None else predict
         self.with_gyroscope = isinstance(believed, OdometryBelief) and believed.gyroscope
         self.exact = model is OdometryModel.EXACT_ARC
         self._Q = np.zeros((2, 2))
