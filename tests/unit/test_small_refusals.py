@@ -298,6 +298,7 @@ def test_a_laser_too_coarse_for_a_team_is_refused(settings: list[str], least: in
         (["run"], "image: a.png\nresolution: 0.05\n", "expected a mission, found a map;"),
         (["sweep"], "study: a\n", "expected a mission, found a study;"),
         (["study"], "extends: museum-1\n", "expected a study, found a mission; 'pilotage run' takes it"),
+        (["study"], "extends: museum-1\nimage: a.png\n", "expected a study, found a mission;"),
         (["draw"], "extends: museum-1\n", "expected a map, found a mission;"),
         (["plan", "--start", "1,1", "--goal", "2,2"], "study: a\n", "expected a map, found a study;"),
     ],

@@ -9,10 +9,10 @@ from pilotage.core.errors import InputError
 
 MARKS = {
     "study": frozenset({"study"}),
-    "map": frozenset({"walls_m", "size_m", "image"}),
     "mission": frozenset({"extends", "world", "robot", "robots", "stack", "task", "run"}),
+    "map": frozenset({"walls_m", "size_m", "image"}),
 }
-"""Keys that only files of one kind have."""
+"""Keys that only files of one kind have; a file with keys of several is of the first."""
 TAKEN_BY = {
     "study": "'pilotage study' takes it",
     "map": "'pilotage draw' takes it, and world.map of a mission",
