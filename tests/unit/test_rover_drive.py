@@ -80,9 +80,9 @@ class TestDrive:
     def test_the_reports_first_task(self) -> None:
         """338,190 s within 0.01 %; the end within 1.1 mm and 1e-3 rad.
 
-        A command is held for a step: with steps of 5 s it is near enough to the continuous law.
+        A command is held for a step: the mission's 5 s is near enough to the continuous law.
         """
-        finished = simulate(load_mission("gale-pose", [OPEN_MAP, "run.dt_s=5"])).finished
+        finished = simulate(load_mission("gale-pose", [OPEN_MAP])).finished
         robot: RobotRun = finished.robots[0]
         assert robot.arrived
         assert finished.duration_s == pytest.approx(338_190.0, rel=1e-4)
@@ -118,11 +118,11 @@ class TestDrive:
         assert status is StackStatus.ARRIVED
 
     def test_a_time_limit_ends_it(self) -> None:
-        finished = simulate(load_mission("gale-pose", [OPEN_MAP, "run.time_limit_s=95"])).finished
+        finished = simulate(load_mission("gale-pose", [OPEN_MAP, "run.time_limit_s=93"])).finished
         assert not finished.robots[0].arrived
-        assert finished.ending == "time limit of 95 s reached"
+        assert finished.ending == "time limit of 93 s reached"
         # The step in which the time is over is driven to its end.
-        assert finished.duration_s == 100.0
+        assert finished.duration_s == 95.0
 
     def test_already_there(self) -> None:
         status, t_s, _ = moved(Pose2(0.0, 0.0, 0.0), Pose2(0.0, 0.0, 0.0))
