@@ -48,6 +48,10 @@ class _Locator(_SourceFileBackedLocatorMixin, _CacheLocator):
     def get_cache_path(self) -> str:
         return str(folder_of(Path(self._py_file)))
 
+    def get_source_stamp(self) -> str:
+        """The folder's name: what is in it was compiled of these sources, whenever a clone wrote them."""
+        return folder_of(Path(self._py_file)).name
+
     def ensure_cache_path(self) -> None:
         """Where there can be none (any more), nothing is found and nothing kept."""
         with suppress(OSError):
