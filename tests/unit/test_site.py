@@ -129,6 +129,17 @@ def test_a_drawing_is_a_file_of_its_own(maker: ModuleType) -> None:
     assert [child.tag.rpartition("}")[2] for child in root] == ["style", "image", "text"]
 
 
+def test_the_gallery_has_a_card_for_each_run(
+    maker: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """That of the other tests is empty: ``make docs`` ended at the first run's picture."""
+    monkeypatch.setattr(maker, "ROOT", tmp_path)
+    page = maker._gallery(tmp_path, (("barn-course", 0),))
+    assert '<a class="card" href="barn-course.html"><img loading="lazy" src="barn-course.svg"' in page
+    assert ElementTree.parse(tmp_path / "barn-course.svg").getroot().tag.endswith("svg")
+    assert (tmp_path / "barn-course.html").is_file()
+
+
 def test_durations_are_told_as_one_says_them(maker: ModuleType) -> None:
     assert [maker.lasted(t) for t in (96.4, 594.0, 338150.0)] == ["96 s", "9.9 min", "93.9 h"]
 
