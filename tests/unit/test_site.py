@@ -9,9 +9,11 @@ import sys
 from html.parser import HTMLParser
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 from urllib.parse import unquote
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 
 import pilotage as pl
@@ -76,6 +78,21 @@ def test_a_site_opened_from_its_files_searches(site: Path, browser: Browser) -> 
         browser.wait("document.querySelector('.md-search-result').innerText.includes('matching')")
 
 
+def test_a_site_keeps_to_the_system_and_its_drawings_can_be_read(site: Path, browser: Browser) -> None:
+    """It stayed light for good where the first visit was, and dark drawings had the dark page for their ground."""
+    for scheme, kept in (("light", "default"), ("dark", "slate")):
+        browser.call(
+            "Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}]
+        )
+        browser.open(
+            site / "index.html", "document.readyState === 'complete' && location.href.includes('site')"
+        )
+        browser.wait(f"document.body.dataset.mdColorScheme === '{kept}'")
+    drawn = "getComputedStyle(document.querySelector('img[src$=\".svg\"]')).backgroundColor"
+    assert browser.js(drawn) == "rgb(255, 255, 255)"
+    browser.call("Emulation.setEmulatedMedia", features=[])
+
+
 def test_no_link_is_dead_and_nothing_is_fetched(site: Path) -> None:
     pages = {path: Page(path) for path in site.rglob("*.html")}
     assert len(pages) > 60
@@ -119,6 +136,30 @@ def test_notebooks_are_stored_without_outputs(path: Path) -> None:
         if cell["cell_type"] == "code":
             assert (cell["outputs"], cell["execution_count"]) == ([], None)
             ast.parse("".join(cell["source"]))
+
+
+@pytest.mark.parametrize("path", sorted((DOCS / "notebooks").glob("*.ipynb")), ids=lambda path: path.stem)
+def test_notebooks_words_are_read_without_a_typesetter(path: Path) -> None:
+    """The site loads none: of a formula in dollars its source is seen."""
+    cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
+    words = "".join("".join(cell["source"]) for cell in cells if cell["cell_type"] == "markdown")
+    assert "$" not in words
+
+
+def test_every_setting_of_the_notebook_that_compares_filters_has_numbers(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Filters that believe their beacons ten times too much notice soon: half of its figure was empty."""
+    book = json.loads((DOCS / "notebooks" / "4-comparing-filters.ipynb").read_text(encoding="utf-8"))
+    source = next("".join(cell["source"]) for cell in book["cells"] if cell["cell_type"] == "code")
+    for of_eight, of_one in (("trials=8", "trials=1"), ("workers=2", "workers=1")):
+        assert of_eight in source
+        source = source.replace(of_eight, of_one)
+    names: dict[str, Any] = {}
+    monkeypatch.chdir(tmp_path)
+    exec(source, names)
+    for metric in ("position_rmse_m", "nees_mean"):
+        assert np.isfinite(names["study"].rows.values[metric]).all()
 
 
 def test_a_drawing_is_a_file_of_its_own(maker: ModuleType) -> None:

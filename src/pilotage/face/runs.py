@@ -228,4 +228,4 @@ def _map_html(folder: Path) -> str:
     picture = picture_of(folder)
     if not picture.svg:
         return f"<p>{html.escape(picture.caption)}</p>"
-    return f'<div style="max-width:760px">{picture.svg}</div>'
+    return f'<div style="max-width:760px;background:#fff">{picture.svg}</div>'
