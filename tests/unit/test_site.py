@@ -79,7 +79,7 @@ def test_a_site_opened_from_its_files_searches(site: Path, browser: Browser) -> 
 
 
 def test_a_site_keeps_to_the_system_and_its_drawings_can_be_read(site: Path, browser: Browser) -> None:
-    """It stayed light for good where the first visit was, and dark drawings had the dark page for their ground."""
+    """It stayed light for good where the first visit was, and dark lines had a dark ground."""
     for scheme, kept in (("light", "default"), ("dark", "slate")):
         browser.call(
             "Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}]
