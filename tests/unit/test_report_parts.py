@@ -370,10 +370,8 @@ def test_a_robots_long_reason_leaves_its_numbers_in_sight(browser: Browser, tmp_
     reason = "stuck: gave up after 30 replans, the last because the laser shows no room for the command"
     entry = {"success": False, "reason": reason, "path_length_m": 10.0, "position_rmse_m": 0.01}
     box = "document.querySelector('#robots table').parentElement"
-    for width, more in (
-        (900, {}),
-        (1280, {"goal_error_m": 0.1, "position_max_m": 0.1, "min_clearance_m": 0.1}),
-    ):
+    whole = dict.fromkeys(("goal_error_m", "position_max_m", "min_clearance_m"), 0.1)
+    for width, more in ((900, {}), (1280, whole | {"collisions": 0, "replans": 0})):
         each = {"a long name of the first of them": entry | more, "b": entry | more}
         shown = page([team_section({"robots": each})], title="", eyebrow="", footer="")
         file = tmp_path / f"{width}.html"
