@@ -455,7 +455,7 @@ def test_a_type_error_of_a_components_own_stays_its_own() -> None:
 
 def test_a_metric_that_does_not_take_a_run_is_refused() -> None:
     metrics = Metrics([], {})
-    metrics.computed_by(Metric("mine_m", "mine", "m", ""))(lambda _: 1.0)  # type: ignore[arg-type]
+    metrics.computed_by(Metric("mine_m", "mine", "m", ""))(lambda _: 1.0)  # type: ignore[arg-type, misc]
     with pytest.raises(InputError, match=r"metric 'mine_m' of .*: expected to take 2 arguments as its role"):
         metrics.computed("reach", {}, {})
 
