@@ -207,13 +207,9 @@ def lasted(duration_s: float) -> str:
 
 def picture(folder: Path) -> str:
     """A run's map as a file of its own."""
-    from pilotage.records.run_data import read_run
-    from pilotage.report.drawn import map_of
-    from pilotage.report.style import drawing_style
+    from pilotage.report.drawn import picture_of
 
-    with drawing_style():
-        drawn = map_of(read_run(folder)).svg
-    return as_file(drawn)
+    return as_file(picture_of(folder).svg)
 
 
 def as_file(drawn: str) -> str:

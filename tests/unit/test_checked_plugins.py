@@ -392,7 +392,7 @@ class TakesNothing:
 @pytest.mark.parametrize(("base", "found"), [(TakesOne, "(self, config)"), (TakesWords, "(self, *, config)")])
 def test_one_that_cannot_be_built_as_its_role_says_is_refused(base: type, found: str) -> None:
     """It was a TypeError of ours."""
-    members = {"__module__": "somebodys", "step": lambda *_: None}
+    members = {"__module__": "somebodys", "step": lambda *_: None, "reset": lambda *_: None}
     cls = checked(type("Mine", (base,), members), "controller 'mine'", *CONTROLLERS.gives)
     told = f"^controller 'mine' of 'somebodys': expected to be built from 2 arguments .*{re.escape(found)}"
     with pytest.raises(InputError, match=told):
@@ -408,7 +408,7 @@ def test_a_planner_is_looked_at_over_cells_as_well() -> None:
 
 
 def test_one_without_a_constructor_is_built_from_nothing() -> None:
-    members = {"__module__": "somebodys", "step": lambda *_: None}
+    members = {"__module__": "somebodys", "step": lambda *_: None, "reset": lambda *_: None}
     cls = checked(type("Mine", (TakesNothing,), members), "controller 'mine'", *CONTROLLERS.gives)
     assert cls()
     with pytest.raises(InputError, match="expected to be built from 2 arguments"):
@@ -423,6 +423,41 @@ def test_one_without_its_roles_method_is_refused_as_it_registers() -> None:
     cls = type("Mine", (), {"__module__": "somebodys"})
     with pytest.raises(InputError, match="expected a class with a method 'plan', found none"):
         checked(cls, "planner 'mine'", *PLANNERS.gives)
+
+
+@pytest.mark.parametrize(
+    ("registry", "method"), [(CONTROLLERS, "reset"), (REACTIVES, "reset"), (ESCAPES, "begin")]
+)
+def test_one_without_a_method_that_gives_nothing_is_refused_as_well(registry: Any, method: str) -> None:
+    """It drove until the method was called, if it ever was."""
+    cls = type("Mine", (), {"__module__": "somebodys", "step": lambda *_: None})
+    with pytest.raises(InputError, match=f"expected a class with a method '{method}', found none"):
+        checked(cls, "mine", *registry.gives)
+
+
+@pytest.mark.parametrize("role", GIVES)
+def test_a_method_that_does_not_take_what_its_role_calls_it_with_is_refused(role: str) -> None:
+    """It was a TypeError of ours, that named every plugin."""
+    _, name = GIVES[role]
+    method = made(role, None, **{name: lambda _0, _1, _2, _3, _4, _5, _6: None})
+    with pytest.raises(InputError, match=rf"'mine' of 'somebodys': {name}: expected to take \d argument"):
+        method(*CALLED_WITH.get(role, ()))
+
+
+def test_a_type_error_of_a_components_own_stays_its_own() -> None:
+    with pytest.raises(TypeError, match="unsupported operand"):
+        made("planner", None, plan=lambda *_: 1 + None)(ASKED)  # type: ignore[operator]
+    metrics = Metrics([], {})
+    metrics.computed_by(Metric("mine_m", "mine", "m", ""))(lambda *_: 1 + None)  # type: ignore[operator]
+    with pytest.raises(TypeError, match="unsupported operand"):
+        metrics.computed("reach", {}, {})
+
+
+def test_a_metric_that_does_not_take_a_run_is_refused() -> None:
+    metrics = Metrics([], {})
+    metrics.computed_by(Metric("mine_m", "mine", "m", ""))(lambda _: 1.0)  # type: ignore[arg-type, misc]
+    with pytest.raises(InputError, match=r"metric 'mine_m' of .*: expected to take 2 arguments as its role"):
+        metrics.computed("reach", {}, {})
 
 
 def test_our_own_are_left_as_they_are() -> None:

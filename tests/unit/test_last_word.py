@@ -213,6 +213,25 @@ def test_a_scan_counts_for_three_periods_from_where_the_robot_has_come_since(tol
     assert hears(word, 3.05).allows(AHEAD_M_S)
 
 
+@pytest.mark.parametrize("wrong", [OdometryIncrement(0.5, 0.0), OdometryIncrement(0.02, 0.5)])
+def test_odometry_that_no_such_robot_drives_moves_no_walls(wrong: OdometryIncrement) -> None:
+    """Two per cent of outliers put walls on its map that are nowhere, until no plan was left."""
+    right = OdometryIncrement(0.02, 0.0)
+    word = word_of({"lidar": ALL_ROUND} | TOLD)
+    seen = scan_of(ALL_ROUND, [0.75, -3.0, 0.75, 3.0], [-3.0, 0.4, 3.0, 0.4])
+    hears(word, 0.1, lidar=seen, odometry=right)
+    hears(word, 0.2, odometry=wrong)
+    assert word.allows(Twist(0.2, 0.0))
+    x_m, y_m = word._guard.place_m
+    assert (x_m, y_m) == pytest.approx((0.04, 0.0))
+    # Of half a second in which it told nothing as much is possible, and counts.
+    hears(word, 0.3)
+    for k in range(4, 8):
+        hears(word, 0.1 * k)
+    hears(word, 0.8, odometry=OdometryIncrement(0.5, 0.0))
+    assert word._guard.place_m[0] == pytest.approx(0.54)
+
+
 def test_what_lies_deep_in_the_body_is_its_own() -> None:
     """Dirt on a laser's window: a robot that heeds it never moves again."""
     ranges_m = np.full(539, 20.0)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from pilotage.core.types import Goal, Pose2
+from pilotage.evaluation.driving import smoothness
 from pilotage.experiments.build.charts import load_chart
 from pilotage.experiments.mission import load_mission
 from pilotage.experiments.run import run_mission
@@ -91,3 +92,11 @@ def test_waypoints_stay_as_near_as_the_planner_connects() -> None:
     assert away.max() <= 0.75 + 0.05
     assert plan.first_waypoints is not None
     assert np.hypot(*np.diff(plan.first_waypoints[:, :2], axis=0).T).max() <= 0.75 + 1e-9
+
+
+@pytest.mark.parametrize("angle_rad", np.linspace(-3.1, 3.1, 9).tolist())
+def test_a_straight_line_is_smooth_at_any_angle(angle_rad: float) -> None:
+    """A page told 1.05e-18: rounding turns a little at every point."""
+    ahead = np.array([np.cos(angle_rad), np.sin(angle_rad)])
+    assert smoothness([3.7, -11.3] + np.linspace(0.0, 7.3, 60)[:, None] * ahead) == 0.0
+    assert smoothness(np.array([[0.0, 0.0], [1.0, 0.0], [2.0, 1e-3]])) == pytest.approx(1e-6, rel=1e-3)

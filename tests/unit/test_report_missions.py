@@ -21,11 +21,10 @@ from pilotage.maps.occupancy_grid import UNKNOWN, OccupancyGrid
 from pilotage.records.run_data import read_run, read_team
 from pilotage.records.trace import Trace
 from pilotage.report import write_report
-from pilotage.report.drawn import map_of, pose_given, scene_of, without_given_pose
+from pilotage.report.drawn import picture_of, pose_given, scene_of, without_given_pose
 from pilotage.report.figures.grid import FREE_CELL, OCCUPIED_CELL, UNKNOWN_CELL, cell_classes, known_corners
 from pilotage.report.page import run_page
 from pilotage.report.replay.team import team_scene
-from pilotage.report.style import drawing_style
 from support.fabricated_run import fabricate_run
 from support.pages import Outline, page_of
 
@@ -212,10 +211,7 @@ def test_a_team_is_shown_whole(two: Path) -> None:
 
 def test_the_one_figure_of_a_team_has_all_of_it(two: Path) -> None:
     """Of a study's worst trial, and in notebooks, the first robot was drawn as if it had been alone."""
-    team = read_team(two, read_run(two))
-    with drawing_style():
-        picture = map_of(team)
-    assert all(f"robot-{k}" in picture.svg for k in range(len(team)))
+    assert all(f"robot-{k}" in picture_of(two).svg for k in range(2))
 
 
 def test_a_teams_damage_is_told_once_and_each_view_is_as_read_alone(two: Path, tmp_path: Path) -> None:

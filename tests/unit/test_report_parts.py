@@ -369,11 +369,13 @@ def test_close_ups_show_who_was_there(tmp_path: Path) -> None:
 def test_a_robots_long_reason_leaves_its_numbers_in_sight(browser: Browser, tmp_path: Path) -> None:
     reason = "stuck: gave up after 30 replans, the last because the laser shows no room for the command"
     entry = {"success": False, "reason": reason, "path_length_m": 10.0, "position_rmse_m": 0.01}
-    each = {"a long name of the first of them": entry, "b": entry}
-    shown = page([team_section({"robots": each})], title="", eyebrow="", footer="")
-    file = tmp_path / "page.html"
-    file.write_text(shown, encoding="utf-8")
-    browser.size(900, 800)
-    browser.open(file, "document.querySelector('#robots table')")
     box = "document.querySelector('#robots table').parentElement"
-    assert browser.js(f"{box}.scrollWidth <= {box}.clientWidth")
+    whole = dict.fromkeys(("goal_error_m", "position_max_m", "min_clearance_m"), 0.1)
+    for width, more in ((900, {}), (1280, whole | {"collisions": 0, "replans": 0})):
+        each = {"a long name of the first of them": entry | more, "b": entry | more}
+        shown = page([team_section({"robots": each})], title="", eyebrow="", footer="")
+        file = tmp_path / f"{width}.html"
+        file.write_text(shown, encoding="utf-8")
+        browser.size(width, 800)
+        browser.open(file, "document.querySelector('#robots table')")
+        assert browser.js(f"{box}.scrollWidth <= {box}.clientWidth")

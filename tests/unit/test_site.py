@@ -9,9 +9,11 @@ import sys
 from html.parser import HTMLParser
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 from urllib.parse import unquote
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 
 import pilotage as pl
@@ -76,6 +78,21 @@ def test_a_site_opened_from_its_files_searches(site: Path, browser: Browser) -> 
         browser.wait("document.querySelector('.md-search-result').innerText.includes('matching')")
 
 
+def test_a_site_keeps_to_the_system_and_its_drawings_can_be_read(site: Path, browser: Browser) -> None:
+    """It stayed light for good where the first visit was, and dark lines had a dark ground."""
+    for scheme, kept in (("light", "default"), ("dark", "slate")):
+        browser.call(
+            "Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}]
+        )
+        browser.open(
+            site / "index.html", "document.readyState === 'complete' && location.href.includes('site')"
+        )
+        browser.wait(f"document.body.dataset.mdColorScheme === '{kept}'")
+    drawn = "getComputedStyle(document.querySelector('img[src$=\".svg\"]')).backgroundColor"
+    assert browser.js(drawn) == "rgb(255, 255, 255)"
+    browser.call("Emulation.setEmulatedMedia", features=[])
+
+
 def test_no_link_is_dead_and_nothing_is_fetched(site: Path) -> None:
     pages = {path: Page(path) for path in site.rglob("*.html")}
     assert len(pages) > 60
@@ -121,12 +138,47 @@ def test_notebooks_are_stored_without_outputs(path: Path) -> None:
             ast.parse("".join(cell["source"]))
 
 
+@pytest.mark.parametrize("path", sorted((DOCS / "notebooks").glob("*.ipynb")), ids=lambda path: path.stem)
+def test_notebooks_words_are_read_without_a_typesetter(path: Path) -> None:
+    """The site loads none: of a formula in dollars its source is seen."""
+    cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
+    words = "".join("".join(cell["source"]) for cell in cells if cell["cell_type"] == "markdown")
+    assert "$" not in words
+
+
+def test_every_setting_of_the_notebook_that_compares_filters_has_numbers(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Filters that believe their beacons ten times too much notice soon: half of its figure was empty."""
+    book = json.loads((DOCS / "notebooks" / "4-comparing-filters.ipynb").read_text(encoding="utf-8"))
+    source = next("".join(cell["source"]) for cell in book["cells"] if cell["cell_type"] == "code")
+    for of_eight, of_one in (("trials=8", "trials=1"), ("workers=2", "workers=1")):
+        assert of_eight in source
+        source = source.replace(of_eight, of_one)
+    names: dict[str, Any] = {}
+    monkeypatch.chdir(tmp_path)
+    exec(source, names)
+    for metric in ("position_rmse_m", "nees_mean"):
+        assert np.isfinite(names["study"].rows.values[metric]).all()
+
+
 def test_a_drawing_is_a_file_of_its_own(maker: ModuleType) -> None:
     """Browsers show nothing of one with a prefix without a name space, such as a shaded terrain's."""
     drawn = '<svg viewBox="0 0 1 1"><image xlink:href="data:image/png;base64,AA=="/><text>x</text></svg>'
     root = ElementTree.fromstring(maker.as_file(drawn))
     assert root.tag == "{http://www.w3.org/2000/svg}svg"
     assert [child.tag.rpartition("}")[2] for child in root] == ["style", "image", "text"]
+
+
+def test_the_gallery_has_a_card_for_each_run(
+    maker: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """That of the other tests is empty: ``make docs`` ended at the first run's picture."""
+    monkeypatch.setattr(maker, "ROOT", tmp_path)
+    page = maker._gallery(tmp_path, (("barn-course", 0),))
+    assert '<a class="card" href="barn-course.html"><img loading="lazy" src="barn-course.svg"' in page
+    assert ElementTree.parse(tmp_path / "barn-course.svg").getroot().tag.endswith("svg")
+    assert (tmp_path / "barn-course.html").is_file()
 
 
 def test_durations_are_told_as_one_says_them(maker: ModuleType) -> None:

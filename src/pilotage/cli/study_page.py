@@ -11,13 +11,11 @@ from pilotage.experiments.studies.attribution import attribution_of, is_attribut
 from pilotage.experiments.studies.findings import best_settings, findings_of
 from pilotage.experiments.studies.replay import mission_of_row
 from pilotage.experiments.studies.table import StudyTable, read_study
-from pilotage.records.run_data import read_run, read_team
-from pilotage.report.drawn import map_of
+from pilotage.report.drawn import picture_of
 from pilotage.report.markup import REPORT_FILE
 from pilotage.report.page import write_report as write_run_report
 from pilotage.report.study.examples import Example, describe, rows_to_show
 from pilotage.report.study.page import write_page
-from pilotage.report.style import drawing_style
 
 TRIALS = "trials"
 
@@ -61,9 +59,7 @@ def _example(table: StudyTable, title: str, row: int) -> Example:
     result = run_mission(mission_of_row(table.study, row), out=table.folder / TRIALS)
     assert result.run_dir is not None
     page = write_run_report(result.run_dir)
-    run = read_run(result.run_dir)
-    with drawing_style():
-        picture = map_of(read_team(result.run_dir, run))
+    picture = picture_of(result.run_dir)
     return Example(
         title,
         row,

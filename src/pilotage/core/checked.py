@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -49,6 +49,11 @@ def keeps(expected: str, wrong: Callable[[Any], str]) -> Gives:
     return Gives("__init__", expected, lambda _, component, *__: wrong(component))
 
 
+def there(method: str) -> Gives:
+    """A method that a component has to have, whatever it gives."""
+    return Gives(method, "that it is there", lambda *_: "")
+
+
 _ANYTHING = keeps("anything", lambda _: "")
 
 
@@ -87,10 +92,14 @@ def _looked_at(cls: type, whose: str, gives: Gives) -> Callable[..., Any]:
 
     @functools.wraps(its_own)
     def look(self: Any, *args: Any, **kwargs: Any) -> Any:
-        if built:
-            _require_taken(its_own, whose, (self, *args), kwargs)
         before = () if gives.before is None else (gives.before(self),)
-        given = None if its_own is object.__init__ else its_own(self, *args, **kwargs)
+        # A class without a constructor of its own takes nothing.
+        its = _takes_nothing if its_own is object.__init__ else its_own
+        try:
+            given = its(self, *args, **kwargs)
+        except TypeError:
+            require_taken(its, where, "be built from" if built else "take", args, kwargs, itself=(self,))
+            raise
         found = gives.wrong(given, self, *before, *args, *kwargs.values())
         if found:
             raise InputError(f"{where}: expected {gives.expected}, found {found}")
@@ -103,16 +112,24 @@ def _takes_nothing(self: object) -> None:
     """The constructor of a class that has none."""
 
 
-def _require_taken(method: Callable[..., Any], whose: str, args: Any, kwargs: Any) -> None:
-    """Refuse a constructor that does not take what it is called with."""
-    signature = inspect.signature(_takes_nothing if method is object.__init__ else method)
+def require_taken(
+    function: Callable[..., Any],
+    whose: str,
+    role: str,
+    args: tuple[Any, ...],
+    kwargs: Mapping[str, Any],
+    itself: tuple[Any, ...] = (),
+) -> None:
+    """Refuse a function that does not take what it is called with; ``itself``: what a method gets first."""
+    signature = inspect.signature(function)
     try:
-        signature.bind(*args, **kwargs)
+        signature.bind(*itself, *args, **kwargs)
     except TypeError as error:
-        count = len(args) - 1 + len(kwargs)
+        name = "__init__" if function is _takes_nothing else function.__name__
+        count = len(args) + len(kwargs)
         bare = [parameter.replace(annotation=parameter.empty) for parameter in signature.parameters.values()]
         shown = signature.replace(parameters=bare, return_annotation=signature.empty)
         raise InputError(
-            f"{whose}: expected to be built from {count} argument{'s' * (count != 1)} as its role says, "
-            f"found __init__{shown}: {error}"
+            f"{whose}: expected to {role} {count} argument{'s' * (count != 1)} as its role says, "
+            f"found {name}{shown}: {error}"
         ) from None

@@ -225,6 +225,8 @@ def split_errors(
 
 
 CHECK_M = 0.01
+ROUNDING_RAD = 1e-8
+"""Turns below this are rounding's own: of a straight line's points none is."""
 
 
 def smoothness(points_xy_m: FloatArray) -> float:
@@ -242,6 +244,7 @@ def smoothness(points_xy_m: FloatArray) -> float:
     lengths = np.hypot(steps[:, 0], steps[:, 1])
     directions = np.arctan2(steps[:, 1], steps[:, 0])
     turns = np.abs((np.diff(directions) + math.pi) % (2.0 * math.pi) - math.pi)  # pi - angle
+    turns[turns < ROUNDING_RAD] = 0.0
     return float(np.sum((2.0 * turns / (lengths[:-1] + lengths[1:])) ** 2))
 
 

@@ -24,7 +24,6 @@ from pilotage.missions.mission import Mission
 from pilotage.records.events import read_events
 from pilotage.records.metrics import METRICS_FILE, read_metrics
 from pilotage.records.mission import read_mission
-from pilotage.records.run_data import read_run, read_team
 from pilotage.records.trace import TRACE_FILE, read_trace
 
 MOST_TOLD = 12
@@ -224,12 +223,9 @@ def _summary_html(run: Run) -> str:
 
 def _map_html(folder: Path) -> str:
     """The first figure of the run's page."""
-    from pilotage.report.drawn import map_of
-    from pilotage.report.style import drawing_style
+    from pilotage.report.drawn import picture_of
 
-    data = read_run(folder)
-    with drawing_style():
-        picture = map_of(read_team(folder, data))
+    picture = picture_of(folder)
     if not picture.svg:
         return f"<p>{html.escape(picture.caption)}</p>"
-    return f'<div style="max-width:760px">{picture.svg}</div>'
+    return f'<div style="max-width:760px;background:#fff">{picture.svg}</div>'

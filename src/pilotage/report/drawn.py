@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from pilotage.evaluation.metrics import METRICS
-from pilotage.records.run_data import RunData
+from pilotage.records.run_data import RunData, read_run, read_team
 from pilotage.records.trace import Trace
 from pilotage.report.figures.clearance import clearance_figure
 from pilotage.report.figures.close_ups import close_ups_figure
@@ -39,7 +40,7 @@ from pilotage.report.replay.terrain import terrain_scene
 from pilotage.report.sheet.maps import accuracy_figure, printed_figure
 from pilotage.report.sheet.path import coverage_figure, path_figure
 from pilotage.report.sheet.replay import sheet_scene
-from pilotage.report.style import Illustration
+from pilotage.report.style import Illustration, drawing_style
 
 Draw = Callable[[RunData], Illustration]
 
@@ -120,6 +121,12 @@ def map_of(team: Sequence[RunData]) -> Illustration:
     if run.terrain is not None:
         return terrain_map_figure(run) if run.terrain.ground is not None else hazard_map_figure(run)
     return map_figure(run) if run.sheet is None else path_figure(run)
+
+
+def picture_of(folder: Path) -> Illustration:
+    """Draw that figure of a run's folder."""
+    with drawing_style():
+        return map_of(read_team(folder, read_run(folder)))
 
 
 def scene_of(run: RunData) -> ReplayScene | None:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from types import MappingProxyType
 
+from pilotage.core.checked import require_taken
 from pilotage.core.errors import InputError, nearest
 from pilotage.core.misfit import told, unfit_number
 from pilotage.core.plugins import giver, load_plugins, take
@@ -127,15 +128,23 @@ class Metrics:
                 if lacking is not None:
                     lacking[metric.key] = error.args[0]
                 continue
+            except TypeError:
+                require_taken(metric.compute, _whose(metric), "take", (trace, metrics), {})
+                raise
             if value is None:
                 continue
             if unfit_number(value):
                 raise InputError(
-                    f"metric '{metric.key}' of {giver(metric.compute.__module__)}: expected a finite number, "
-                    f"or None of a run that does not give it, found {told(value)}"
+                    f"{_whose(metric)}: expected a finite number, or None of a run that does not give it, "
+                    f"found {told(value)}"
                 )
             found[metric.key] = float(value)
         return found
+
+
+def _whose(metric: Metric) -> str:
+    assert metric.compute is not None
+    return f"metric '{metric.key}' of {giver(metric.compute.__module__)}"
 
 
 class NoColumnError(KeyError):

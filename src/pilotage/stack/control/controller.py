@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-from pilotage.core.checked import Gives
+from pilotage.core.checked import Gives, there
 from pilotage.core.misfit import misfit
 from pilotage.core.registry import Registry
 from pilotage.core.types import Pose2, Twist
@@ -38,5 +38,8 @@ class Controller(Protocol):
 CONTROLLERS: Registry[Controller] = Registry(
     "controller",
     "pilotage.stack.control",
-    gives=(Gives("step", "a Control of finite numbers", lambda given, *_: misfit(given, Control)),),
+    gives=(
+        there("reset"),
+        Gives("step", "a Control of finite numbers", lambda given, *_: misfit(given, Control)),
+    ),
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from pilotage.core.checked import Gives
+from pilotage.core.checked import Gives, there
 from pilotage.core.misfit import misfit
 from pilotage.core.registry import Registry
 from pilotage.core.types import Pose2, Twist
@@ -25,5 +25,7 @@ def _unfit(given: object, *_: object) -> str:
 
 
 ESCAPES: Registry[Escape] = Registry(
-    "escape", "pilotage.stack.control", gives=(Gives("step", "a Twist of finite numbers, or None", _unfit),)
+    "escape",
+    "pilotage.stack.control",
+    gives=(there("begin"), Gives("step", "a Twist of finite numbers, or None", _unfit)),
 )

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol
 
-from pilotage.core.checked import Gives
+from pilotage.core.checked import Gives, there
 from pilotage.core.misfit import misfit
 from pilotage.core.registry import Registry
 from pilotage.core.types import FloatArray, Pose2
@@ -66,5 +66,7 @@ def _unfit(given: object, *_: object) -> str:
 
 
 REACTIVES: Registry[Reactive] = Registry(
-    "reactive", "pilotage.stack.control", gives=(Gives("step", "a Reaction of numbers", _unfit),)
+    "reactive",
+    "pilotage.stack.control",
+    gives=(there("reset"), Gives("step", "a Reaction of numbers", _unfit)),
 )
