@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from pilotage.core.types import FloatArray
 from pilotage.kernels.geometry.near_paths import away_from_path
 
 
@@ -10,7 +11,8 @@ from pilotage.kernels.geometry.near_paths import away_from_path
 def test_to_the_bit_what_hypot_says_of_each_point(seed: int) -> None:
     """Orders to make room compare them with sums of radii: rounded otherwise they send robots elsewhere."""
     rng = np.random.default_rng(seed)
-    xs, ys = -3.2 + 0.15 * np.arange(40), 1.1 + 0.15 * np.arange(25)
+    xs: FloatArray = np.linspace(-3.2, 2.65, 40)
+    ys: FloatArray = np.linspace(1.1, 4.7, 25)
     path = np.cumsum(0.25 * rng.normal(size=(30, 2)), axis=0)
     path[7:9] = path[3]
     nodes = np.stack(np.meshgrid(xs, ys), axis=-1)
