@@ -10,6 +10,7 @@ import numpy as np
 
 from pilotage.core.types import BoolArray, FloatArray
 from pilotage.kernels.control import eikonal
+from pilotage.kernels.geometry.near_paths import away_from_path
 from pilotage.stack.patrol.roadmap import STEP_M, Roadmap
 
 AROUND_M = 8.0
@@ -105,8 +106,8 @@ class Evacuation:
         self._roadmap, self._window = roadmap, np.s_[row : high[1] + 1, column : high[0] + 1]
         self._step_m, self._x0, self._y0 = step, x0 + column * step, y0 + row * step
         rows, columns = roadmap.slowness[self._window].shape
-        xs, ys = self._x0 + step * np.arange(columns), self._y0 + step * np.arange(rows)
-        self._nodes: FloatArray = np.stack(np.meshgrid(xs, ys), axis=-1)
+        self._xs, self._ys = self._x0 + step * np.arange(columns), self._y0 + step * np.arange(rows)
+        self._nodes: FloatArray = np.stack(np.meshgrid(self._xs, self._ys), axis=-1)
 
     def clear(self) -> bool:
         """Send everybody off the path who is on it and was not sent; whether there were places for all."""
@@ -188,10 +189,7 @@ class Evacuation:
         """(rows, columns) how far nodes are from a path, worked out once for it."""
         key = line_xy_m.tobytes()
         if key not in self._from_lines:
-            nearest = np.full(self._nodes.shape[:2], np.inf)
-            for place in line_xy_m:
-                np.minimum(nearest, np.hypot(*(self._nodes - place).transpose(2, 0, 1)), out=nearest)
-            self._from_lines[key] = nearest
+            self._from_lines[key] = away_from_path(self._xs, self._ys, np.ascontiguousarray(line_xy_m))
         return self._from_lines[key]
 
     def _near(self, body: FloatArray, here: FloatArray, slow: FloatArray, apart_m: float) -> BoolArray:

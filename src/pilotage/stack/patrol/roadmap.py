@@ -262,6 +262,12 @@ class Roadmap:
         eikonal.sweep_down(field, slow, self.spacing_m)
         return field
 
+    def way_back(self, place: int, clearance_m: float) -> FloatArray:
+        """(rows, columns) time to where paths lead to a place from, over floor that leaves less to walls."""
+        field = np.where(np.isfinite(self.time_s(place)), 0.0, np.inf)
+        eikonal.sweep_down(field, self.slowness_for(clearance_m), self.spacing_m)
+        return field
+
     def placed(self, values: FloatArray) -> Field:
         """Values (rows, columns) at its nodes, and where these are."""
         return values, *self.origin_xy_m, self.spacing_m

@@ -61,7 +61,7 @@ class Context(Paths):
         self.claim: Claim | None = None
         self.clearing: Clearing | None = None
         self._has_news, self.pursuit, self.headway = False, Pursuit(), Headway()
-        self._said_lost = False
+        self._said_lost, self.knows_place = False, True
         self.battery: Battery | None = None
         if task.supply is not None:
             station = len(task.graph) + task.robot
@@ -78,6 +78,7 @@ class Context(Paths):
     def sense(self, readings: Readings, belief: Belief, *, lost: bool) -> None:
         """Take in one step's readings."""
         driven_m = self.take_in(readings, belief, lost=lost)
+        self.knows_place = not lost
         if self.battery is not None:
             self.battery.spend(driven_m)
         if self.fresh:

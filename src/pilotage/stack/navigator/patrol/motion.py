@@ -10,6 +10,7 @@ from pilotage.core.types import STOP, FloatArray, Pose2, Twist
 from pilotage.kernels.control import disc_returns, eikonal, safe_stop, voronoi_window
 from pilotage.kernels.geometry.field import Field
 from pilotage.models.motion.motion import MotionConfig
+from pilotage.stack.navigator.patrol.approach import Approach
 from pilotage.stack.navigator.patrol.gate import NO_GATE, gate_at
 from pilotage.stack.navigator.patrol.onward import Onward
 from pilotage.stack.navigator.patrol.passage import CLAIM_M
@@ -81,6 +82,8 @@ class Motion:
         window = config.window
         costs = window.heading_s_per_rad, window.near_cost_s, window.soft_m
         self._window = window.horizon_s, *costs, window.speeds, window.turns
+        sees_s = window.horizon_s + period_s + LATENCY_S
+        self._approach = Approach(speed, braking, sees_s, senses.pass_m)
         self._room: tuple[FloatArray, Pose2, tuple[float, float]] | None = None
         self._still, self._meets = StillWatch(), Onward(period_s + LATENCY_S, braking)
         self._onward = NO_POINTS
@@ -99,6 +102,11 @@ class Motion:
         """(P, 2) returns, base frame, of people and of who comes as they do."""
         people, onward = self._senses.people, self._onward
         return np.concatenate([people, onward]) if len(onward) else people
+
+    @property
+    def turns_back_s(self) -> float:
+        """How long it takes to come back to where it drove past."""
+        return self._approach.turns_back_s
 
     @property
     def is_met(self) -> bool:
@@ -174,12 +182,21 @@ class Motion:
             lane_m *= not self.taken
         if at is None or self.taken:
             then = -1
-        v, w, held = self._choose(time, at, came_from, then, discs, lane_m)
+        limits = self._limits_ahead(time, then)
+        v, w, held = self._choose(time, at, came_from, then, discs, lane_m, limits)
         if held and lane_m > 0.0:
             # Beside a corner the lane may lead into it; the middle does not.
-            v, w, held = self._choose(time, at, came_from, then, discs, 0.0)
+            v, w, held = self._choose(time, at, came_from, then, discs, 0.0, limits)
         self.command = Twist(v, w)
         return self.command
+
+    def _limits_ahead(self, time: FloatArray, then: int) -> FloatArray:
+        """Its limits, no faster than its way ahead lets it be; no slower than its brakes make it by then."""
+        senses, limits = self._senses, self._limits
+        top_m_s = self._approach.speed_m_s(self.roadmap, senses.pose, time, then)
+        if top_m_s >= limits[0]:
+            return limits
+        return np.array([max(top_m_s, senses.twist.v_m_s - limits[2] * limits[5]), *limits[1:]])
 
     def _choose(
         self,
@@ -189,6 +206,7 @@ class Motion:
         then: int,
         discs: FloatArray,
         lane_m: float,
+        limits: FloatArray,
     ) -> tuple[float, float, bool]:
         """Speed, turn rate, and whether it stays where it is: down a field, around discs (M, 3)."""
         senses, pose = self._senses, self._senses.pose
@@ -205,7 +223,7 @@ class Motion:
             senses.twist.v_m_s,
             senses.twist.w_rad_s,
             pose.as_array(),
-            self._limits,
+            limits,
             self._safety,
             (senses.near, senses.strange, self._give_way_to_nobody()),
             field,

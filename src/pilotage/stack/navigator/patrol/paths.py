@@ -72,6 +72,7 @@ class Paths(Senses):
         self._whole, self._obstructions, self._impasses = self.roadmap, Obstructions(), Impasses()
         self._open = self._whole
         self._shut: Roadmap | None = None
+        self._back: tuple[Roadmap, FloatArray] | None = None
         self.hop = self.came_from = self.roadmap.nearest(start.x_m, start.y_m)
 
     def _others_are_shut(self, shut: ShutPaths) -> None:
@@ -204,6 +205,18 @@ class Paths(Senses):
         roadmap, (x, y) = self.roadmap, (self.pose.x_m, self.pose.y_m)
         field = roadmap.placed(roadmap.time_s(self.came_from))
         return eikonal.value_at(x, y, field, 0.0) == math.inf and eikonal.descent(x, y, field) == (0.0, 0.0)
+
+    def way_back(self) -> FloatArray | None:
+        """The field to where paths lead from; None where it leads nowhere either.
+
+        Brakes are looked at straight on, and may lead through a gap that is too narrow for plans.
+        """
+        if self._back is None or self._back[0] is not self.roadmap:
+            # Nodes may lie beside the middle of such a gap: what commands keep from walls would shut it.
+            self._back = self.roadmap, self.roadmap.way_back(self.came_from, self.radius_m)
+        field = self._back[1]
+        here_s = eikonal.value_at(self.pose.x_m, self.pose.y_m, self.roadmap.placed(field), 0.0)
+        return field if math.isfinite(here_s) else None
 
     def without_planned_around(self, places: FloatArray) -> FloatArray:
         """Places (M, 2) but those of who is planned around: the path leads past, and nobody comes there."""

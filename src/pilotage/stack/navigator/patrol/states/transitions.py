@@ -32,7 +32,9 @@ def patience_s(context: Context) -> float:
 
 def set_out(context: Context) -> Driving:
     """On to the hop."""
-    watch = StallWatch(PROGRESS_S, patience_s(context))
+    # Who takes that long to brake and come back to where it drove past is not held up.
+    slower = max(1.0, context.motion.turns_back_s / context.config.patience_s)
+    watch = StallWatch(PROGRESS_S, slower * patience_s(context))
     watch.restart(context.t_s)
     return Driving(context, watch, context.roadmap)
 
