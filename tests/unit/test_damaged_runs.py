@@ -10,9 +10,12 @@ from __future__ import annotations
 import os
 import re
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from scipy.io import savemat
 
@@ -82,6 +85,23 @@ def a_calibration(folder: Path) -> Path:
     assert main(words) == 0
     (run,) = (folder / "out").iterdir()
     return run
+
+
+@pytest.mark.parametrize(
+    ("make", "columns", "value"),
+    [(a_drive_on_terrain, ["ref_x_m"], -1e4), (a_recording, ["speed_error"], np.nan)],
+)
+def test_a_column_that_is_elsewhere_or_says_nothing(
+    make: Callable[[Path], Path], columns: list[str], value: float, tmp_path: Path
+) -> None:
+    """The window of a curve beside the map had no size, an error of which no value is known no line."""
+    run = make(tmp_path)
+    table = pq.read_table(run / "trace.parquet")
+    for name in columns:
+        values = value + table[name].to_numpy()
+        table = table.set_column(table.column_names.index(name), name, pa.array(values))
+    pq.write_table(table, run / "trace.parquet")
+    assert main(["report", str(run)]) == 0
 
 
 def driven(folder: Path, mission: str, *settings: str) -> Path:

@@ -36,7 +36,7 @@ _ERRORS: tuple[tuple[str, str, str, float, Callable[[float], str]], ...] = (
 def gauss_markov_figure(run: RunData) -> Illustration:
     """Draw every Gauss-Markov error that the filter was free to estimate, one panel each."""
     trace, t_s = run.trace, run.trace.t_s
-    free = [error for error in _ERRORS if bool(np.any(np.nan_to_num(trace[f"{error[0]}_std"]) > 0.0))]
+    free = [error for error in _ERRORS if _is_told(trace[error[0]], trace[f"{error[0]}_std"])]
     if not free:
         return Illustration(SLUG, TITLE, "", "The localizer estimates its pose only.")
     titles = [f"{name} [{unit}]" for _, name, unit, _, _ in free]
@@ -56,6 +56,11 @@ def gauss_markov_figure(run: RunData) -> Illustration:
     alt = "Estimated Gauss-Markov errors of drive and sensor over time, with bands of two standard deviations"
     keys = (Key("estimate", BLUE), Key("±2σ", SKY, "band", opacity=0.4))
     return Illustration(SLUG, TITLE, alt, caption, render(figure, SLUG, alt), keys)
+
+
+def _is_told(value: FloatArray, std: FloatArray) -> bool:
+    """Whether a filter was free to estimate an error, and some value of it is there to be drawn."""
+    return bool(np.any(np.nan_to_num(std) > 0.0) and np.any(np.isfinite(value)))
 
 
 def _panel(axes: Axes, t_s: FloatArray, value: FloatArray, std: FloatArray) -> None:

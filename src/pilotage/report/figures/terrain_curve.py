@@ -31,13 +31,11 @@ def curve_figure(run: RunData) -> Illustration:
     apart = _distances(curve, route)
     worst = curve[int(apart.argmax())]
     unit = unit_of(pictures)
-    half = 0.5 * WINDOW_M
+    half = 0.5 * WINDOW_M / unit
     rim = corners(pictures)
-    figure, axes = ground_axes(
-        pictures,
-        np.maximum((worst - half) / unit, rim.min(axis=0)),
-        np.minimum((worst + half) / unit, rim.max(axis=0)),
-    )
+    low, high = rim.min(axis=0), rim.max(axis=0)
+    centre = np.clip(worst / unit, low, high)
+    figure, axes = ground_axes(pictures, np.maximum(centre - half, low), np.minimum(centre + half, high))
     ground = pictures.hazards if pictures.ground is None else pictures.ground
     show_ground(axes, pictures, tinted(ground, pictures.hazards, ORANGE, 0.45))
     near = np.abs(route - worst).max(axis=1) < WINDOW_M
