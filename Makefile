@@ -78,10 +78,11 @@ format: setup  ## format the code
 	@$(PY) -m ruff check --fix --select I .
 
 format-check: setup
-	@$(PY) -m ruff format --check .
+	@$(PY) -m ruff format --no-cache --check .
 
+# Without its cache: kept answers outlived a new `__init__.py`, which changes what an import is.
 lint: setup
-	@$(PY) -m ruff check .
+	@$(PY) -m ruff check --no-cache .
 
 types: setup
 	@$(PY) -m mypy

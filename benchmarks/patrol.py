@@ -20,8 +20,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from benchmarks.graph_patrol import GraphPatrol, Radio, patrol, spread_starts
 
+from benchmarks.graph_patrol import GraphPatrol, Radio, patrol, spread_starts
 from pilotage.core.types import FloatArray
 from pilotage.evaluation.idleness import idleness
 from pilotage.evaluation.paired import difference

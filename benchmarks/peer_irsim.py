@@ -24,9 +24,9 @@ from typing import Any
 
 import numpy as np
 import yaml
-from benchmarks.museum import GOAL_TOLERANCE_M, Museum
 from PIL import Image
 
+from benchmarks.museum import GOAL_TOLERANCE_M, Museum
 from pilotage.core.types import FloatArray
 from pilotage.experiments.build.robots import motion_of
 from pilotage.sensors.lidar import LidarConfig

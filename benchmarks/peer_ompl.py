@@ -22,6 +22,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+
 from benchmarks.museum import (
     CHECK_STEP_M,
     CLEARANCE_M,
@@ -33,7 +34,6 @@ from benchmarks.museum import (
     Museum,
     Query,
 )
-
 from pilotage.core.types import FloatArray
 from pilotage.maps.distance_field import DistanceField
 

@@ -26,6 +26,9 @@ from dataclasses import asdict, dataclass
 from importlib.metadata import PackageNotFoundError, version
 
 import numpy as np
+from rich.console import Console
+from rich.table import Table
+
 from benchmarks.museum import (
     CELL_M,
     CLEARANCE_M,
@@ -42,9 +45,6 @@ from benchmarks.museum import (
 )
 from benchmarks.peer_irsim import IrsimPeer
 from benchmarks.peer_ompl import OmplPeer
-from rich.console import Console
-from rich.table import Table
-
 from pilotage import __version__
 from pilotage.sensors.lidar import LidarConfig
 

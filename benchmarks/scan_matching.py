@@ -23,8 +23,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from benchmarks.slam_logs import chosen
 
+from benchmarks.slam_logs import chosen
 from pilotage.core.types import FloatArray
 from pilotage.evaluation.relations import relation_errors
 from pilotage.logs.laser_log import LaserLog

@@ -19,8 +19,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from benchmarks.slam_logs import chosen
 
+from benchmarks.slam_logs import chosen
 from pilotage.core.types import FloatArray
 from pilotage.evaluation.relations import relation_errors
 from pilotage.kernels.slam.frames import between, composed

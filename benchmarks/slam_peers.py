@@ -25,7 +25,6 @@ from pathlib import Path
 
 from benchmarks import peer_mrpt
 from benchmarks.scan_matching import error_m, kiss_icp, points_of
-
 from pilotage.core.types import FloatArray
 from pilotage.logs.laser_log import LaserLog
 from pilotage.logs.laser_recordings import read_laser_log

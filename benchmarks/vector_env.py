@@ -17,9 +17,9 @@ import time
 
 import gymnasium
 import numpy as np
+
 from benchmarks.museum import Museum
 from benchmarks.peer_irsim import IrsimPeer
-
 from pilotage.bridges import gym
 from pilotage.sensors.lidar import LidarConfig
 
