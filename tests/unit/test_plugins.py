@@ -168,6 +168,10 @@ METRICS.add(Metric("duration_s", "mine", "s", ""))
             PARAMETERS.format(parameter="gain: float = float('inf')"),
             "expected defaults that it takes itself: gain: input should be a finite number, found inf",
         ),
+        (
+            TAKEN.replace("def plan", "def plot").replace("astar", "mine"),
+            "expected a class with a method 'plan'",
+        ),
         (TAKEN, "planner 'astar': expected a new name, found it registered already"),
         (TAKEN_METRIC, "metric 'duration_s': expected a new key, found it declared already"),
         (None, "expected a Python file, found none there"),
@@ -185,7 +189,7 @@ def test_a_plugin_that_cannot_be_used_is_one_line(
         assert answer.out == ""
         assert answer.err.count("\n") == 1
         assert told in answer.err
-        assert f"plugin '{file}'" in answer.err
+        assert answer.err.count(f"plugin '{file}'") == 1
     assert str(file) not in plugins.named_plugins()
     assert set(tmp_path.iterdir()) <= {file}
 

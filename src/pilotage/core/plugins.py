@@ -166,7 +166,8 @@ def load_file(path: str) -> None:
         # Asked for once more it is refused once more.
         del _loaded[path], sys.modules[name]
         told = str(error) if isinstance(error, InputError) else _where(error, path)
-        raise PluginError(f"plugin '{path}': {told}") from None
+        whose = f"plugin '{path}'"
+        raise PluginError(told if f"of {whose}: " in told else f"{whose}: {told}") from None
 
 
 def _is_among(path: str, paths: Iterable[str]) -> bool:
