@@ -150,6 +150,7 @@ sys.exit(", ".join(sorted(unused)) or code)
 
 
 def test_garbage_is_looked_for_seldom_in_a_process_of_its_own_only() -> None:
+    """Fifty times as seldom as Python 3.11 does; later ones begin with other numbers."""
     script = """
 import gc, sys
 from pilotage.cli.main import main
@@ -158,7 +159,7 @@ code = main(["--version"])
 called = gc.get_threshold() == before
 sys.argv[1:] = ["--version"]
 code = code or main()
-print(code, called, gc.get_threshold()[0] >= 50 * before[0])
+print(code, called, gc.get_threshold()[0] >= 35_000)
 """
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
     assert done.stdout.splitlines()[-1] == "0 True True"

@@ -42,7 +42,7 @@ def test_ends_meet_for_every_word_and_the_shortest_is_the_shortest(a: Pose, b: P
         if math.isfinite(pieces[0]):
             assert min(pieces) >= 0.0
             assert off(end(dubins.Curve(*a, r, other, *pieces)), b) < 1e-6
-            assert best <= sum(pieces)
+            assert best <= sum(pieces) + 1e-9  # two words of one length differ by rounding
 
 
 @given(pose, pose, radius)
