@@ -104,7 +104,7 @@ class TestStopping:
                 (time, -2.0, -3.0, 0.1),
                 (NO_MAP, 0.0, 0.0, 0.1),
             )
-            window = (0.9, 0.3, 0.5, 0.25, 6, 15)
+            window = (0.9, 0.3, 0.5, 0.25, 6, 15, 0.0)
             v, w, _ = voronoi_window.choose(
                 v, w, pose, limits, safety, seen, field, NO_GATE, known, 0.0, window
             )
@@ -140,7 +140,7 @@ class TestStopping:
                 NO_GATE,
                 (NO_MAP, 0.0, 0.0, 0.1),
                 0.0,
-                (0.9, 0.3, 0.5, 0.25, 6, 15),
+                (0.9, 0.3, 0.5, 0.25, 6, 15, 0.0),
             )
             pose = pose + 0.2 * np.array(
                 [v * math.cos(pose[2] + 0.1 * w), v * math.sin(pose[2] + 0.1 * w), w]
@@ -172,7 +172,7 @@ class TestStopping:
                 NO_GATE,
                 (NO_MAP, 0.0, 0.0, 0.1),
                 0.0,
-                (0.9, 0.3, 0.5, 0.25, 6, 15),
+                (0.9, 0.3, 0.5, 0.25, 6, 15, 0.0),
             )
             for _ in range(20):
                 v, w = safe_stop.toward(v, told_v, 0.003), safe_stop.toward(w, told_w, 0.02)
@@ -232,7 +232,7 @@ class TestTheBestArc:
 
     LIMITS = np.array([1.0, 2.0, 2.0, 2.0, 8.0, 0.2])
     SAFETY = np.array([REACTION, 0.3, 0.06, 0.1, 1.4])
-    WINDOW = (0.9, 0.3, 0.5, 0.25, 6, 15)
+    WINDOW = (0.9, 0.3, 0.5, 0.25, 6, 15, 0.0)
 
     @pytest.mark.parametrize("seed", range(40))
     def test_is_the_best_of_all_that_can_be_braked(self, seed: int) -> None:
@@ -314,7 +314,7 @@ class TestDrivingThrough:
     @staticmethod
     def _driven_s(bearing: float, *, knows: bool) -> float:
         limits, safety = np.array([1.0, 2.0, 2.0, 2.0, 8.0, 0.1]), np.array([REACTION, 0.3, 0.06, 0.1, 1.4])
-        window, seen = (0.9, 0.3, 0.5, 0.25, 6, 15), (NOBODY, NOBODY, NOBODY)
+        window, seen = (0.9, 0.3, 0.5, 0.25, 6, 15, 0.0), (NOBODY, NOBODY, NOBODY)
         rows, columns = np.mgrid[:101, :101]
         x, y = 0.1 * columns - 5.0, 0.1 * rows - 5.0
         end = 2.0 * np.array([math.cos(bearing), math.sin(bearing)])

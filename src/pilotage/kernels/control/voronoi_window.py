@@ -27,8 +27,9 @@ from pilotage.kernels.geometry.field import Field
 from pilotage.kernels.geometry.motion import exact_arc, wrap
 from pilotage.kernels.jit import kernel
 
-Window: TypeAlias = tuple[float, float, float, float, int, int]
-"""Horizon, cost of a heading off the field, cost of nearness and the distance it begins at, speeds, turns."""
+Window: TypeAlias = tuple[float, float, float, float, int, int, float]
+"""Horizon, cost of a heading off the field, cost of nearness and the distance it begins at, speeds, turns,
+and the speed which to be short of costs the time to gain it."""
 Gate: TypeAlias = tuple[Field, float, float, float, float]
 """A place to pass and where to go from there: the field, the place's x and y, how near is
 there (below 0: there is no such place), and what is left from there on, the turn at it included."""
@@ -78,7 +79,7 @@ def choose(
         there cuts a corner to the nearest heading in which it may set out and comes nearer.
     """
     near, strange, people = seen
-    horizon_s, heading_cost, near_cost, soft_m, speeds, turns = window
+    horizon_s, heading_cost, near_cost, soft_m, speeds, turns, slow = window
     top, acceleration, deceleration, top_turn, turn_acceleration, period = (
         limits[0],
         limits[1],
@@ -141,6 +142,7 @@ def choose(
                 cost += gate[4]
             if by_gate:
                 cost = min(cost, through(v, w, pose, gate, lane_m, window, min(cost, bar)))
+            cost += max(slow - v, 0.0) / acceleration
             if cost > bar:
                 continue
             least = (soft_m + radius) * (soft_m + radius)

@@ -1,55 +1,58 @@
-"""How fast a robot on weak brakes comes to a door that it turns into."""
+"""How fast a robot on weak brakes may be, by what lies ahead on its way."""
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 
 from pilotage.core.types import FloatArray, Pose2
-from pilotage.kernels.control import bends
+from pilotage.kernels.control.straight_stop import speed_to_stop
+from pilotage.kernels.geometry.field import Field
 from pilotage.stack.patrol.roadmap import STEP_M, Roadmap
-
-BEND_RAD = 0.4
-"""A path that is turned by more from where the robot heads leads around a bend."""
 
 
 class Approach:
-    """The speed from which it slows down in time for a bend in a narrow place.
+    """The speed from which it slows down in time for what its way comes to.
 
-    Arcs of the dynamic window are looked at no farther than its horizon: who takes longer to stop came to
-    each door beside its path too fast, and past it. Where it is wide, or straight on, that costs less than
-    braking.
+    Commands are given where it can stop straight on from them, and arcs of the dynamic window are looked at
+    no farther than its horizon: who takes longer to stop came to each door beside its path too fast to turn,
+    and past it. Where there is room straight on, as on a wide floor, a bend slows it down by nothing.
 
     Parameters
     ----------
     top_m_s, braking_m_s2
         By the data sheet.
-    sees_s
-        How long it drives from one look to the end of its arcs. Who stops within as far need do nothing.
-    narrow_m
-        Half the width of a passage that is narrow.
+    horizon_s, reacts_s
+        Of its arcs; how long it drives on between two looks. Who stops within both need do nothing.
+    keep_m
+        What its middle keeps from walls.
 
     Attributes
     ----------
     turns_back_s
         So long it takes to come to rest from its top speed, and back up to it.
+    slow_m_s
+        What it is short of this costs it the time to gain it: an arc of so weak a robot that can hardly set
+        out leads as far as one that cannot.
     """
 
-    def __init__(self, top_m_s: float, braking_m_s2: float, sees_s: float, narrow_m: float) -> None:
-        self._top_m_s, self._braking_m_s2, self._narrow_m = top_m_s, braking_m_s2, narrow_m
-        self._bend_m_s = 2.0 * braking_m_s2 * sees_s
-        self._reach_m = (top_m_s**2 - self._bend_m_s**2) / (2.0 * braking_m_s2)
+    def __init__(
+        self, top_m_s: float, braking_m_s2: float, horizon_s: float, reacts_s: float, keep_m: float
+    ) -> None:
+        self._top_m_s, self._braking_m_s2 = top_m_s, braking_m_s2
+        self._reacts_s, self._keep_m = reacts_s, keep_m
+        self._sees = top_m_s <= 2.0 * braking_m_s2 * (horizon_s + reacts_s)
+        self._reach_m = 0.5 * top_m_s**2 / braking_m_s2
         self.turns_back_s = 2.0 * top_m_s / braking_m_s2
+        self.slow_m_s = 0.0 if self._sees else braking_m_s2 * horizon_s
 
-    def speed_m_s(self, roadmap: Roadmap, pose: Pose2, time: FloatArray, then: int) -> float:
-        """Of its way down a field, and on to vertex ``then`` unless that is -1."""
-        if self._reach_m <= 0.0:
+    def speed_m_s(self, roadmap: Roadmap, pose: Pose2, time: FloatArray, then: int, known: Field) -> float:
+        """Of its way down a field, and on to vertex ``then`` unless that is -1; by its map's distances."""
+        if self._sees:
             return self._top_m_s
         way = roadmap.way(pose.x_m, pose.y_m, time, self._reach_m)
         left_m = self._reach_m - STEP_M * len(way)
         if then >= 0 and len(way) and left_m > 0.0:
             x, y = way[-1, :2].tolist()
             way = np.concatenate([way, roadmap.way(x, y, roadmap.time_s(then), left_m)[1:]])
-        bend_m = bends.narrow_bend_m(way, pose.theta_rad, BEND_RAD, self._narrow_m)
-        return min(self._top_m_s, math.sqrt(self._bend_m_s**2 + 2.0 * self._braking_m_s2 * bend_m))
+        limits = self._top_m_s, self._braking_m_s2, self._reacts_s
+        return float(speed_to_stop(way, known, self._keep_m, *limits))

@@ -81,9 +81,9 @@ class Motion:
         )
         window = config.window
         costs = window.heading_s_per_rad, window.near_cost_s, window.soft_m
-        self._window = window.horizon_s, *costs, window.speeds, window.turns
-        sees_s = window.horizon_s + period_s + LATENCY_S
-        self._approach = Approach(speed, braking, sees_s, senses.pass_m)
+        reacts_s, keep_m = period_s + LATENCY_S, senses.radius_m + config.margin_m
+        self._approach = Approach(speed, braking, window.horizon_s, reacts_s, keep_m)
+        self._window = window.horizon_s, *costs, window.speeds, window.turns, self._approach.slow_m_s
         self._room: tuple[FloatArray, Pose2, tuple[float, float]] | None = None
         self._still, self._meets = StillWatch(), Onward(period_s + LATENCY_S, braking)
         self._onward = NO_POINTS
@@ -193,7 +193,8 @@ class Motion:
     def _limits_ahead(self, time: FloatArray, then: int) -> FloatArray:
         """Its limits, no faster than its way ahead lets it be; no slower than its brakes make it by then."""
         senses, limits = self._senses, self._limits
-        top_m_s = self._approach.speed_m_s(self.roadmap, senses.pose, time, then)
+        known = senses.field(lost=False)
+        top_m_s = self._approach.speed_m_s(self.roadmap, senses.pose, time, then, known)
         if top_m_s >= limits[0]:
             return limits
         return np.array([max(top_m_s, senses.twist.v_m_s - limits[2] * limits[5]), *limits[1:]])
