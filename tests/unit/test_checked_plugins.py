@@ -484,4 +484,15 @@ def test_metrics_look_at_a_run_and_leave_it_alone() -> None:
     assert known == {"success": True}
 
 
+@pytest.mark.parametrize("most", [[1e9, 0.0, 0.0], [0.0, 0.0, -1e5]])
+def test_a_motion_moves_no_farther_than_any_robot(most: list[float]) -> None:
+    """To look for contacts along a thousand million metres a step took minutes."""
+
+    def far(motion: Any, *_: object) -> None:
+        motion.moves = np.array([most])
+
+    with pytest.raises(InputError, match=r"expected moves .* up to 10,000 .*, found a move of 1e\+0"):
+        made("motion", None, command=far)(Twist(0.1, 0.0))
+
+
 # Installed packages

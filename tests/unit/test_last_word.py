@@ -169,6 +169,23 @@ def test_what_one_beam_alone_sees_is_dust(beams: int, field_rad: float) -> None:
     assert not allows([ahead - 1, ahead + 1])  # the one between measured nothing, or something else
 
 
+def test_the_end_of_a_wall_that_is_met_edge_on_is_seen_scan_by_scan() -> None:
+    """One beam at a time hits it, those beside it pass: a robot drove into what it had seen five times."""
+    sheet = LidarConfig(beams=90, field_of_view_rad=2.0 * math.pi, range_var_m2=1e-6)
+    word, at_m, allowed = word_of({"lidar": sheet} | TOLD), 0.0, True
+    for k in range(1, 20):
+        wall = [1.0 - at_m, 0.03, 3.0 - at_m, 0.03]
+        hears(word, 0.1 * k, lidar=scan_of(sheet, wall), odometry=OdometryIncrement(0.05, 0.0))
+        allowed = word.allows(AHEAD_M_S)
+        if not allowed:
+            break
+        at_m += 0.05
+    assert not allowed
+    assert 1.0 - at_m > 0.3, "the disc of 0.3 m has not touched it"
+    assert len(word.shown_m)
+    assert abs(word.shown_m[:, 1] - 0.03).max() < 0.02
+
+
 def test_of_a_laser_without_beams_beside_each_other_each_is_believed() -> None:
     sheet = LidarConfig(beams=3, field_of_view_rad=math.pi)
     word = rolls(word_of({"lidar": sheet} | TOLD), lidar=LidarScan(np.array([3.0, 0.35, 3.0])))
@@ -408,8 +425,8 @@ def test_corners_between_beams_are_not_driven_into(
     box[1] *= side
     sides = np.column_stack([box.T, np.roll(box, -1, axis=1).T])
     touches = touches_an_end(
-        scan_of(sheet, *sides.tolist()).ranges_m, LaserView("laser", sheet).directions, (0.0, 0.0), 3.0,
-        (0.0, 0.0, 0.0), (1.2, 0.0, 0.0), 120, (RECTANGLE, 0.34, 0.2),
+        scan_of(sheet, *sides.tolist()).ranges_m[None], np.zeros((1, 3)), np.array([3.0]),
+        LaserView("laser", sheet).fan, (1.2, 0.0, 0.0), 120, (RECTANGLE, 0.34, 0.2),
         (0.01, sheet.beam_step_rad, 0.05, 0.0),
     )  # fmt: skip
     assert touches

@@ -346,6 +346,27 @@ def test_the_best_evasion_goes_around_what_it_cannot_brake_for() -> None:
     assert -3.0 < score < 0.0
 
 
+@pytest.mark.parametrize(("off", "kept"), [(0.5, True), (0.3, True), (0.0, False)])
+def test_what_one_beam_hit_is_gone_once_a_beam_leads_through_it(off: float, kept: bool) -> None:
+    """The end of a wall, hit by one beam of ninety, was forgotten as two passed it to either side."""
+    cell, n, beams = 0.05, 60, 90
+    step = 2.0 * math.pi / beams
+    hits, mean, seen = np.zeros((n, n), np.uint8), np.zeros((n * n, 2)), np.zeros((n // 2, n // 2), np.bool_)
+    grids, body, still = Grids(hits, mean, seen, -1.5, -1.5, cell), make_body(JACKAL), np.zeros(3)
+    ranges = np.full(beams, 3.0)
+    ranges[beams // 2] = 0.8
+    end_m = np.array([[0.8, 0.0]])
+    fan = Fan(ranges, -math.pi, step, 9.0, sectors(beams, step))
+    insert_scan(grids, fan, still, still, 4.0, 9.0, end_m, body.polygon, 0.05, 3)
+    assert np.count_nonzero(hits) == 1
+    nothing, turned = (
+        Fan(np.full(beams, 3.0), -math.pi, step, 9.0, fan.of_sectors),
+        np.array([0.0, 0.0, off * step]),
+    )
+    insert_scan(grids, nothing, turned, still, 4.0, 9.0, np.zeros((0, 2)), body.polygon, 0.05, 3)
+    assert np.count_nonzero(hits) == int(kept)
+
+
 def _stared_at(depth_m: float, seconds: float) -> tuple[ByteArray, FloatArray]:
     """Hits and means after looking at a wall, noise 1 cm, its surface ``depth_m`` into a cell."""
     rng = np.random.default_rng(3)

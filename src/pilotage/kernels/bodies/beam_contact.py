@@ -7,7 +7,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from pilotage.kernels.arrays import BoolArray, FloatArray
+from pilotage.kernels.arrays import FloatArray
 from pilotage.kernels.bodies.outline import signed_distance
 from pilotage.kernels.geometry.motion import turned_part
 from pilotage.kernels.geometry.solids import Outline
@@ -20,11 +20,14 @@ NEIGHBOURS, BESIDE = 2, 0.5
 """Beams to either side confirm an end if they look in about its direction: the cosine of 60 degrees."""
 SAME_M, SAME_BEAMS = 0.1, 3.0
 """Ends so near to each other, or of so many times the distance between their beams, are of one thing."""
+AGAIN_BEAMS, AGAIN_BESIDE = 6.0, 1
+"""In another scan within ``SAME_M`` and so many times that distance, of the beam towards it or of one so far
+beside: of many beams some wrong reading lies near any other soon."""
 
 
 @kernel
-def _is_confirmed(k: int, ranges: FloatArray, directions: FloatArray) -> bool:
-    """Whether a beam beside it ends where it does: what one beam alone sees is dust, or a wrong reading.
+def _is_seen_beside(k: int, ranges: FloatArray, directions: FloatArray) -> bool:
+    """Whether a beam beside it ends where it does: what one beam alone sees once is dust, or a wrong reading.
 
     Of a laser that has no beams beside each other each is believed.
     """
@@ -43,15 +46,6 @@ def _is_confirmed(k: int, ranges: FloatArray, directions: FloatArray) -> bool:
         if apart <= max(SAME_M**2, SAME_BEAMS**2 * beams):
             return True
     return alone
-
-
-@kernel
-def confirmed_ends(ranges: FloatArray, directions: FloatArray, reach: float) -> BoolArray:
-    """(N,) which beams end nearer than ``reach``, confirmed by one beside them."""
-    found = np.zeros(ranges.shape[0], np.bool_)
-    for k in range(ranges.shape[0]):
-        found[k] = ranges[k] < reach and _is_confirmed(k, ranges, directions)
-    return found
 
 
 @kernel
@@ -80,13 +74,77 @@ ends between a beam and the next, which passes it, sticks out by their distance 
 than the third is deep; ranges of neighbours that differ by no more than the fourth are of one surface."""
 
 
+Fan: TypeAlias = tuple[FloatArray, tuple[float, float]]
+"""(N, 2) directions of beams in the base frame, and the laser's place there."""
+
+
+@kernel
+def _is_seen_again(px: float, py: float, which: int, scans: FloatArray, starts: FloatArray, fan: Fan) -> bool:
+    """Whether in another scan a beam in about its direction ends where one of this scan does.
+
+    The end of a wall that is met edge on is hit by one beam at a time: those beside it pass, or end far
+    behind.
+    """
+    directions, mount = fan
+    count = directions.shape[0]
+    if count == 1:
+        return False
+    turn = abs(directions[0, 0] * directions[1, 1] - directions[0, 1] * directions[1, 0])
+    same = min(SAME_M, AGAIN_BEAMS * turn * math.hypot(px - mount[0], py - mount[1]))
+    x, y, theta = starts[which]
+    c, s = math.cos(theta), math.sin(theta)
+    ahead, left = c * (px - x) + s * (py - y), c * (py - y) - s * (px - x)
+    for i in range(scans.shape[0]):
+        if i == which:
+            continue
+        x, y, theta = starts[i]
+        c, s = math.cos(theta), math.sin(theta)
+        qx, qy = x + c * ahead - s * left - mount[0], y + s * ahead + c * left - mount[1]
+        nearest, most = 0, -math.inf
+        for k in range(count):
+            along = qx * directions[k, 0] + qy * directions[k, 1]
+            if along > most:
+                nearest, most = k, along
+        for off in range(-AGAIN_BESIDE, AGAIN_BESIDE + 1):
+            k = (nearest + off) % count
+            dx, dy = scans[i, k] * directions[k, 0] - qx, scans[i, k] * directions[k, 1] - qy
+            if dx * dx + dy * dy <= same**2:
+                return True
+    return False
+
+
+@kernel
+def _is_confirmed(
+    k: int, px: float, py: float, which: int, scans: FloatArray, starts: FloatArray, fan: Fan
+) -> bool:
+    """Whether a beam's end at a place is seen by a beam beside it, or in another scan."""
+    return _is_seen_beside(k, scans[which], fan[0]) or _is_seen_again(px, py, which, scans, starts, fan)
+
+
+@kernel
+def confirmed_ends(
+    which: int, scans: FloatArray, starts: FloatArray, reach: float, fan: Fan, same: float
+) -> FloatArray:
+    """(K, 2) confirmed ends of a scan's beams that are nearer than ``reach``; see ``touches_an_end``."""
+    directions, mount = fan
+    ranges, out, count = scans[which], np.empty((scans.shape[1], 2)), 0
+    for k in range(ranges.shape[0]):
+        if ranges[k] < reach:
+            away = _range_of(ranges, k, same)
+            px, py = mount[0] + away * directions[k, 0], mount[1] + away * directions[k, 1]
+            if _is_confirmed(k, px, py, which, scans, starts, fan):
+                out[count, 0] = mount[0] + ranges[k] * directions[k, 0]
+                out[count, 1] = mount[1] + ranges[k] * directions[k, 1]
+                count += 1
+    return out[:count]
+
+
 @kernel
 def touches_an_end(
-    ranges: FloatArray,
-    directions: FloatArray,
-    mount: tuple[float, float],
-    reach: float,
-    start: tuple[float, float, float],
+    scans: FloatArray,
+    starts: FloatArray,
+    reaches: FloatArray,
+    fan: Fan,
     move: tuple[float, float, float],
     pieces: int,
     outline: Outline,
@@ -95,50 +153,53 @@ def touches_an_end(
     """Whether a confirmed end of a beam comes nearer than its margin, and nearer than it is, on a move.
 
     Each end is judged by itself: one that is near already, and gets no nearer, says nothing of the others.
-    Deep in the outline nothing stands: what seems to is the robot itself, or dirt on the laser.
+    Deep in the outline nothing stands: what seems to is the robot itself, or dirt on the laser. An end is
+    confirmed by a beam beside it, or by another scan.
 
     Parameters
     ----------
-    ranges, directions, mount
-        (N,) and (N, 2) of a scan in the base frame in which it was taken, from the laser's place on; NaN
-        measured nothing.
-    reach
-        Longer ranges are left out.
-    start, move
-        Pose in that frame in which the robot begins, and how far it drives from there ahead, to the left and
-        around, at constant rates.
+    scans, starts
+        (S, N) ranges, NaN measured nothing, and (S, 3) where the robot begins in the base frame in which each
+        was taken.
+    reaches
+        (S,); longer ranges are left out.
+    move
+        How far it drives ahead, to the left and around, at constant rates.
     pieces
         Poses on the way that are looked at.
     """
     corners, radius, _ = outline
+    directions, mount = fan
     margin, between, own, same = kept
-    x0, y0, theta0 = start
     ahead, lateral, angle = move
-    poses = np.empty((pieces + 1, 4))
-    for i in range(pieces + 1):
-        x, y, theta = turned_part(x0, y0, theta0, ahead, lateral, angle, i / pieces)
-        poses[i] = x, y, math.cos(theta), math.sin(theta)
     # No point of the outline gets any farther, nor in a piece farther than this.
     swept = math.hypot(ahead, lateral) + abs(angle) * radius
     piece = swept / pieces
-    for k in range(ranges.shape[0]):
-        if not ranges[k] < reach:
-            continue
-        away = _range_of(ranges, k, same)
-        off = margin + between * away
-        px, py = mount[0] + away * directions[k, 0], mount[1] + away * directions[k, 1]
-        if (px - x0) ** 2 + (py - y0) ** 2 >= (radius + swept + off) ** 2:
-            continue
-        now = _away(poses[0], px, py, corners, radius)
-        if now < -own or now >= swept + off:
-            continue
-        least = min(off, now - NEARER_M)
-        i = max(1, math.floor((now - least) / piece))
-        while i <= pieces:
-            away = _away(poses[i], px, py, corners, radius)
-            if away < least:
-                if _is_confirmed(k, ranges, directions):
-                    return True
-                break
-            i += max(1, math.floor((away - least) / piece))
+    poses = np.empty((pieces + 1, 4))
+    for which in range(scans.shape[0]):
+        ranges = scans[which]
+        x0, y0, theta0 = starts[which]
+        for i in range(pieces + 1):
+            x, y, theta = turned_part(x0, y0, theta0, ahead, lateral, angle, i / pieces)
+            poses[i] = x, y, math.cos(theta), math.sin(theta)
+        for k in range(ranges.shape[0]):
+            if not ranges[k] < reaches[which]:
+                continue
+            away = _range_of(ranges, k, same)
+            off = margin + between * away
+            px, py = mount[0] + away * directions[k, 0], mount[1] + away * directions[k, 1]
+            if (px - x0) ** 2 + (py - y0) ** 2 >= (radius + swept + off) ** 2:
+                continue
+            now = _away(poses[0], px, py, corners, radius)
+            if now < -own or now >= swept + off:
+                continue
+            least = min(off, now - NEARER_M)
+            i = max(1, math.floor((now - least) / piece))
+            while i <= pieces:
+                away = _away(poses[i], px, py, corners, radius)
+                if away < least:
+                    if _is_confirmed(k, px, py, which, scans, starts, fan):
+                        return True
+                    break
+                i += max(1, math.floor((away - least) / piece))
     return False

@@ -79,14 +79,17 @@ def first_contact(
     pieces = max(1, math.ceil(min(reach / (0.25 * inner), MOST_LOOKS)))
     length = reach / pieces
     last, last_clearance = 0.0, clearance
-    for i in range(pieces):
-        part = (i + 1) / pieces
+    i = 0
+    while i < pieces:
+        # As far as it is clear there is nothing to look at: beyond all walls a few looks do.
+        i = min(i + max(1, math.floor(min(last_clearance, reach) / length)), pieces)
+        part = i / pieces
         px, py, ptheta = turned_part(x, y, theta, distance, lateral, angle, part)
         here = all_clearance(px, py, ptheta, outline, fixed, others, own)
         low, high = -1.0, part
         if here < -CONTACT_TOLERANCE_M and here < last_clearance:
             low = last
-        elif last_clearance + here < length:
+        elif last_clearance + here < reach * (part - last):
             # Both ends are clear, but there may be a contact between them.
             at, at_clearance = last, last_clearance
             while at < part:

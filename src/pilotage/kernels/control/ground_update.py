@@ -17,6 +17,9 @@ SECTORS = 1024
 """Around the laser: a cell beyond the longest range in its sector is asked for no beam, nor for an angle."""
 BEHIND_M = 0.2
 """A beam that ends so far behind a cell's hits has passed them by."""
+THROUGH_M, NEAR_M = 0.005, 1.0
+"""A beam that passes a hit by more has not looked through it: the end of a wall fits between two. Of beams that
+at the second distance are never farther from anything than that, what is there is hit again in time."""
 
 
 class Grids(NamedTuple):
@@ -137,15 +140,15 @@ def _turned(angle: float) -> float:
 def _clear_passed(
     grids: Grids, fan: Fan, far: FloatArray, x: float, y: float, theta: float, fade: int
 ) -> None:
-    """Take ``fade`` hits from every cell that all beams towards it pass by; in place.
+    """Take ``fade`` hits from every cell that all beams towards it pass by, one of them through it; in place.
 
     Something that was there has gone. A cell seen edge-on keeps its hits: one of the beams towards it still
-    ends near it.
+    ends near it, or of few beams none leads through what another has hit.
     """
     mean, cell = grids.mean, grids.cell
     flat = grids.hits.reshape(-1)
     ranges, first, step = fan.ranges, fan.first, fan.step
-    beams = ranges.shape[0]
+    beams, few = ranges.shape[0], 0.5 * step * NEAR_M > THROUGH_M
     c, s = math.cos(theta + first), math.sin(theta + first)
     for i in occupied(grids.hits):
         dx, dy = mean[i, 0] - x, mean[i, 1] - y
@@ -154,10 +157,12 @@ def _clear_passed(
             continue
         if far[_sector(c * dx + s * dy, c * dy - s * dx)] < distance + BEHIND_M:
             continue
-        angle = _turned(math.atan2(dy, dx) - theta - first)
+        at = _turned(math.atan2(dy, dx) - theta - first) / step
         half = cell / distance / step
-        low, high = math.ceil(angle / step - half), math.floor(angle / step + half)
+        low, high = math.ceil(at - half), math.floor(at + half)
         if low < 0 or high >= beams or low > high:
+            continue
+        if few and abs(at - round(at)) * step * distance > THROUGH_M:
             continue
         gone = True
         for k in range(low, high + 1):

@@ -12,6 +12,9 @@ from pilotage.core.misfit import kept, told, unfit_array, unfit_number
 from pilotage.core.types import Command, FloatArray, Twist
 from pilotage.sim.by_config import ByConfig
 
+MOST_A_STEP = 10_000.0
+"""Metres or radians: no robot drives farther, and to look for contacts on the way takes for ever."""
+
 
 class SimulatedMotion(Protocol):
     """How commands become moves; whether a move is possible is the body's business.
@@ -65,17 +68,20 @@ def _count(motion: SimulatedMotion) -> int:
 def _unfit(_: None, motion: SimulatedMotion, before: int, *__: object) -> str:
     wrong = unfit_array(motion.moves, 3)
     # The body's arrays are as long as the first moves.
-    if wrong or len(motion.moves) == before:
-        return wrong
-    return f"{len(motion.moves)} moves instead of {before}"
+    if wrong or len(motion.moves) != before:
+        return wrong or f"{len(motion.moves)} moves instead of {before}"
+    most = float(np.abs(motion.moves).max())
+    return f"a move of {most:g} m or rad" if most > MOST_A_STEP else ""
 
+
+MOVES = f"moves (K, 3) of numbers up to {MOST_A_STEP:,.0f} (m and rad a step)"
 
 SIMULATED_MOTIONS: ByConfig[SimulatedMotion] = ByConfig(
     "motion",
     "pilotage.sim.bodies",
     keeps("moves (K, 3) of numbers, K never another, spins_on and release_m", _unfit_kept),
-    Gives("command", "moves (K, 3) of finite numbers", _unfit, before=_count),
-    Gives("stop", "moves (K, 3) of finite numbers", _unfit, before=_count),
+    Gives("command", MOVES, _unfit, before=_count),
+    Gives("stop", MOVES, _unfit, before=_count),
 )
 """Data sheets to what they truly do."""
 

@@ -11,6 +11,7 @@ from pilotage.core.types import Command, FloatArray, Pose2, Twist
 from pilotage.kernels.arrays import read_only
 from pilotage.kernels.bodies.beam_contact import confirmed_ends, touches_an_end
 from pilotage.kernels.geometry.motion import turned_part
+from pilotage.kernels.geometry.solids import Outline
 from pilotage.sensors.joint_lidar import JointLidarConfig
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, Readings
@@ -44,15 +45,23 @@ class Scan(NamedTuple):
     at: tuple[float, float, float]
 
 
+class Near(NamedTuple):
+    """Of S scans the ranges (S, N), the present pose in the frame of each (S, 3), and how far each counts."""
+
+    ranges_m: FloatArray
+    starts: FloatArray
+    reaches_m: FloatArray
+
+
 class LaserView:
     """What a laser showed of late."""
 
     def __init__(self, name: str, sheet: LidarConfig) -> None:
         self._name, self._valid_s = name, PERIODS / sheet.rate_hz - EPSILON_S
         angles_rad = sheet.mount.theta_rad + sheet.beam_angles_rad()
-        self.directions = read_only(np.column_stack([np.cos(angles_rad), np.sin(angles_rad)]))
-        self.mount = sheet.mount.x_m, sheet.mount.y_m
-        self._arm_m, self._sure_m = math.hypot(*self.mount), sheet.sure_range_m
+        mount = sheet.mount.x_m, sheet.mount.y_m
+        self.fan = read_only(np.column_stack([np.cos(angles_rad), np.sin(angles_rad)])), mount
+        self._arm_m, self._sure_m = math.hypot(*mount), sheet.sure_range_m
         # The nearest of some returns is told too near by about two deviations; a vague laser's are averaged.
         std_m = math.sqrt(sheet.range_var_m2)
         self._between = sheet.beam_step_rad
@@ -76,20 +85,35 @@ class LaserView:
         """Where the robot has moved to since is not known."""
         self._scans.clear()
 
-    def near(self, within_m: float, here: tuple[float, float, float]) -> list[tuple[Scan, float]]:
-        """Scans that may show something so near to where the robot is, and the ranges that it may have."""
+    def near(self, within_m: float, here: tuple[float, float, float]) -> Near | None:
+        """Scans that may show something so near to where the robot is."""
         found, sure_m = [], self._sure_m
         for scan in self._scans:
             x, y, _ = scan.at
             reach_m = (within_m + self._arm_m + math.hypot(here[0] - x, here[1] - y)) * (1.0 + self._between)
             if scan.nearest_m < reach_m and scan.nearest_m < sure_m:
                 found.append((scan, min(reach_m, sure_m)))
-        return found
+        if not found:
+            return None
+        return Near(
+            np.stack([scan.ranges_m for scan, _ in found]),
+            np.array([_since(scan.at, here) for scan, _ in found]),
+            np.array([reach_m for _, reach_m in found]),
+        )
 
-    def ends_m(self, scan: Scan, reach_m: float) -> FloatArray:
-        """(K, 2) ends of what is nearer than ``reach_m``, in the base frame at that time."""
-        near = confirmed_ends(scan.ranges_m, self.directions, reach_m)
-        return np.asarray(self.mount + scan.ranges_m[near, None] * self.directions[near])
+    def touches(self, near: Near, move: tuple[float, float, float], pieces: int, outline: Outline) -> bool:
+        """Whether the robot would touch what scans show on a move."""
+        return touches_an_end(*near, self.fan, move, pieces, outline, self.kept)
+
+    def ends_m(self, near: Near) -> FloatArray:
+        """(K, 2) where what scans show is around the robot."""
+        scans, starts, reaches_m = near
+        return np.concatenate(
+            [
+                Pose2(*start).seen(confirmed_ends(k, scans, starts, reach_m, self.fan, self.kept[-1]))
+                for k, (start, reach_m) in enumerate(zip(starts.tolist(), reaches_m.tolist(), strict=True))
+            ]
+        )
 
 
 class ScanGuard:
@@ -160,7 +184,7 @@ class ScanGuard:
         stops_s = max(speed_m_s / self._braking_m_s2, turn_rate / self._slowing_rad_s2)
         until_s, here = self._reacts_s + 0.5 * stops_s, self._here
         within_m = self._radius_m + TOUCH_M + speed_m_s * until_s
-        near = [(laser, *found) for laser in self._lasers for found in laser.near(within_m, here)]
+        near = [(laser, seen) for laser in self._lasers if (seen := laser.near(within_m, here)) is not None]
         if not near:
             return NOTHING
         # So finely that no corner skips over what is touched.
@@ -168,25 +192,9 @@ class ScanGuard:
         pieces = min(math.ceil(swept_m / TOUCH_M), MOST_PIECES)
         each_s = until_s * speed_m_s / told_m_s if told_m_s > 0.0 else 0.0
         move = command.v_m_s * each_s, command.lateral_m_s * each_s, w_rad_s * until_s
-        for laser, scan, reach_m in near:
-            if touches_an_end(
-                scan.ranges_m,
-                laser.directions,
-                laser.mount,
-                reach_m,
-                _since(scan.at, here),
-                move,
-                pieces,
-                self._outline,
-                laser.kept,
-            ):
-                break
-        else:
+        if not any(laser.touches(seen, move, pieces, self._outline) for laser, seen in near):
             return NOTHING
-        pose = Pose2(*here)
-        return np.concatenate(
-            [pose.seen(Pose2(*scan.at).placed(laser.ends_m(scan, reach_m))) for laser, scan, reach_m in near]
-        )
+        return np.concatenate([laser.ends_m(seen) for laser, seen in near])
 
     def _faster_than(self, moved_m: float, turned_rad: float) -> tuple[float, float]:
         """The most speed and turn rate that comes of what it moved in a step, until it reacts anew."""
