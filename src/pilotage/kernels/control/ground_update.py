@@ -18,8 +18,8 @@ SECTORS = 1024
 BEHIND_M = 0.2
 """A beam that ends so far behind a cell's hits has passed them by."""
 THROUGH_M, NEAR_M = 0.005, 1.0
-"""A beam that passes a hit by more has not looked through it: the end of a wall fits between two. Of beams that
-at the second distance are never farther from anything than that, what is there is hit again in time."""
+"""A beam that passes a hit by more has not looked through it: the end of a wall fits between two. Of beams so
+many that none is farther from anything at the second distance, what is there is hit again in time."""
 
 
 class Grids(NamedTuple):
