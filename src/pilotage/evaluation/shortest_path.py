@@ -134,8 +134,7 @@ def _cheapest(
     chords = points[straights[:, 0]] - points[straights[:, 1]]
     lengths = [np.hypot(chords[:, 0], chords[:, 1]), sweeps * nodes[circle[pairs[:, 0]], 2]]
     lengths += [np.zeros(len(at_ends[0])), np.zeros(len(at_ends[1]))]
-    # As wide as csgraph's own: SciPy before 1.15 takes no other.
-    row, col = np.concatenate(rows).astype(np.int32), np.concatenate(cols).astype(np.int32)
+    row, col = np.concatenate(rows), np.concatenate(cols)
     weight = np.maximum(np.concatenate(lengths), tiny)
     # Two edges between the same vertices would be summed: keep the shorter.
     low, high = np.minimum(row, col), np.maximum(row, col)

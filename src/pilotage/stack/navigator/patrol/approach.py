@@ -40,14 +40,14 @@ class Approach:
     ) -> None:
         self._top_m_s, self._braking_m_s2 = top_m_s, braking_m_s2
         self._reacts_s, self._keep_m = reacts_s, keep_m
-        self._sees = top_m_s <= 2.0 * braking_m_s2 * (horizon_s + reacts_s)
+        self._stops_in_sight = top_m_s <= 2.0 * braking_m_s2 * (horizon_s + reacts_s)
         self._reach_m = 0.5 * top_m_s**2 / braking_m_s2
         self.turns_back_s = 2.0 * top_m_s / braking_m_s2
-        self.slow_m_s = 0.0 if self._sees else braking_m_s2 * horizon_s
+        self.slow_m_s = 0.0 if self._stops_in_sight else braking_m_s2 * horizon_s
 
     def speed_m_s(self, roadmap: Roadmap, pose: Pose2, time: FloatArray, then: int, known: Field) -> float:
         """Of its way down a field, and on to vertex ``then`` unless that is -1; by its map's distances."""
-        if self._sees:
+        if self._stops_in_sight:
             return self._top_m_s
         way = roadmap.way(pose.x_m, pose.y_m, time, self._reach_m)
         left_m = self._reach_m - STEP_M * len(way)
