@@ -246,6 +246,13 @@ class TestRosMaps:
         pixels = np.array([[0, 100, 230, 254]], np.uint8)
         assert RosMap(file, pixels).grid.cells.tolist() == [[OCCUPIED, OCCUPIED, FREE, FREE]]
 
+    def test_the_one_threshold_that_a_file_has_is_for_both_where_the_others_default_is_above_it(self) -> None:
+        """Published maps have it: the default for what is free, 0.25, was held against 0.05 as if written."""
+        file = RosMapFile(image="a.pgm", resolution=1.0, origin=(0, 0, 0), occupied_thresh=0.05)
+        pixels = np.array([[0, 205, 240, 243, 254]], np.uint8)
+        assert RosMap(file, pixels).grid.cells.tolist() == [[OCCUPIED, OCCUPIED, OCCUPIED, FREE, FREE]]
+        assert RosMapFile(image="a.pgm", resolution=1.0, origin=(0, 0, 0)).free_thresh == 0.25
+
     @pytest.mark.parametrize(("grey", "expected"), [(205, UNKNOWN), (206, FREE)])
     def test_what_map_saver_wrote_as_unknown_is(self, grey: int, expected: int) -> None:
         """By the threshold that Navigation 2 writes both are free: robots patrolled around buildings."""

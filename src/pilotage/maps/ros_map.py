@@ -39,6 +39,12 @@ LIKE = 0.75
 Entry = TypeVar("Entry", bound=np.generic)
 
 
+def _free_where_unsaid(said: dict[str, Any]) -> float:
+    """Navigation 2's default, but where a file's one threshold is below it: then that is for both."""
+    occupied: float = said.get("occupied_thresh", 1.0)
+    return min(0.25, occupied)
+
+
 class RosMapFile(Config):
     """The YAML file. ``origin`` is the pose x, y, yaw of the lower-left pixel's outer corner."""
 
@@ -48,7 +54,7 @@ class RosMapFile(Config):
     origin: tuple[float, float, float]
     negate: bool = False
     occupied_thresh: float = Field(0.65, ge=0.0, le=1.0)
-    free_thresh: float = Field(0.25, ge=0.0, le=1.0)
+    free_thresh: float = Field(default_factory=_free_where_unsaid, ge=0.0, le=1.0)
 
     @field_validator("origin", mode="before")
     @classmethod
