@@ -28,9 +28,9 @@ from pilotage.stack.localization.likelihood_field import thin_share
 from pilotage.stack.localization.localizer import LOCALIZERS
 from pilotage.stack.localization.odometry_doubt import OdometryDoubt
 from pilotage.stack.localization.particle_filter import MclConfig, ParticleFilterLocalizer
-from pilotage.stack.localization.same_witness import widening
+from pilotage.stack.localization.same_witness import SameWitness
 from support.robots import ROOM, sensors, told_of
-from support.worlds import alone, robot
+from support.worlds import alone, robot, walled
 
 MCL = "stack.localizer.name=particle-filter"
 
@@ -88,8 +88,7 @@ def test_a_narrow_cloud_is_weighed_as_each_of_its_particles_alone(seed: int, wid
     assert together == pytest.approx(alone_, abs=2.0)
 
 
-@pytest.mark.parametrize("growth", [1.0, 1.5])
-def test_spreading_keeps_the_mean_and_the_covariance_but_for_its_growth(growth: float) -> None:
+def test_spreading_keeps_the_mean_and_the_covariance() -> None:
     before = cloud(200_000)
     weights = np.full(before.shape[0], 1.0 / before.shape[0])
     mean, cov, mean_after, cov_after = np.empty(3), np.empty((3, 3)), np.empty(3), np.empty((3, 3))
@@ -97,29 +96,63 @@ def test_spreading_keeps_the_mean_and_the_covariance_but_for_its_growth(growth: 
     after = before.copy()
     normals = np.random.default_rng(1).standard_normal(after.shape)
     root = np.asarray(np.linalg.cholesky(cov), dtype=np.float64)
-    particles.spread_out(after, mean, root, 0.5, growth, normals)
+    particles.spread_out(after, mean, root, 0.5, normals)
     particles.moments(after, weights, mean_after, cov_after)
     assert mean_after == pytest.approx(mean, abs=2e-3)
-    assert cov_after == pytest.approx(growth * cov, rel=0.02, abs=2e-4)
+    assert cov_after == pytest.approx(cov, rel=0.02, abs=2e-4)
     assert (after[:, 2] < math.pi).all()
     assert (after[:, 2] >= -math.pi).all()
 
 
+def joined(
+    witness: SameWitness, prior: FloatArray, scan: FloatArray, alike: float, given: float
+) -> FloatArray:
+    """Information (3, 3) that is left after a scan of that information, let in with a share of its weight."""
+    posterior = np.linalg.inv(np.linalg.inv(prior) + given * scan)
+    root = witness.widening(prior, posterior, alike, given)
+    left = root @ posterior @ root.T
+    assert (np.linalg.eigvalsh(left - posterior) >= -1e-9 * np.linalg.norm(posterior)).all(), "never narrower"
+    return np.asarray(np.linalg.inv(left))
+
+
+def test_scans_from_one_place_tell_as_much_as_one_of_them() -> None:
+    witness, scan, info = SameWitness(), np.diag([1e4, 4e4, 1e6]), np.diag([1.0, 1.0, 1.0])
+    for _ in range(500):
+        info = joined(witness, np.linalg.inv(info), scan, 0.98, 0.02)
+    share = np.diag(info) / np.diag(scan)
+    assert (share >= 0.99).all()
+    assert (share <= 1.0 / 0.98).all()
+
+
+def test_scans_from_everywhere_tell_together() -> None:
+    witness, scan, info = SameWitness(), np.diag([1e4, 4e4, 1e6]), np.diag([1.0, 1.0, 1.0])
+    for _ in range(10):
+        info = joined(witness, np.linalg.inv(info), scan, 1e-9, 1.0 - 1e-9)
+    assert np.diag(info) == pytest.approx(10.0 * np.diag(scan), rel=0.01)
+
+
+@pytest.mark.parametrize("alike", [0.999, 0.98, 0.6, 0.3, 1e-6])
+def test_what_scans_do_not_tell_is_not_forgotten_for_them(alike: float) -> None:
+    """Along a corridor all scans are alike: its walls say nothing of how far the robot is."""
+    witness, across = SameWitness(), np.diag([0.0, 1e4, 1e6])
+    info = np.diag([400.0, 1.0, 1.0])
+    for _ in range(200):
+        info = joined(witness, np.linalg.inv(info), across, alike, 1.0 - alike)
+    assert info[0, 0] == pytest.approx(400.0, rel=1e-6)
+    assert info[1, 1] >= 0.99 * (1.0 - alike**200) * 1e4
+
+
 def test_a_scan_that_was_let_in_whole_tells_no_more_than_one_where_scans_like_it_told_before() -> None:
     """Known as one scan tells across, and unsure of the heading: the first is left, the second is told."""
-    scan, kept, whole = np.diag([1e-6, 1e4, 1e6]), 0.98, 0.25
-    prior = np.diag([1.0, 2e-4, 1e-3])  # along: unknown to the scan; across: better known than by one
-    known = np.linalg.inv(prior)
-    given_share = 0.4
-    posterior: FloatArray = np.asarray(np.linalg.inv(kept * known + given_share * scan), dtype=np.float64)
-    root = widening(prior, posterior, kept, given_share, whole)
-    left = np.linalg.inv(root @ posterior @ root.T)
-    across = kept * known[1, 1] + (1.0 - kept) * whole * scan[1, 1]
-    assert across == pytest.approx(left[1, 1], rel=1e-9)
-    assert left[2, 2] == pytest.approx(whole * scan[2, 2], rel=1e-9)
-    assert (np.linalg.eigvalsh(root @ posterior @ root.T - posterior) >= -1e-12).all(), "never narrower"
+    witness, scan = SameWitness(), np.diag([0.0, 4e3, 1e6])
+    known = np.diag([1.0, 4e3, 1e6])
+    for _ in range(20):
+        joined(witness, np.linalg.inv(known), scan, 0.98, 0.02)
+    unsure = np.diag([1.0, 4e3, 1e2])
+    left = joined(witness, np.linalg.inv(unsure), scan, 0.98, 1.0)
+    assert np.diag(left) == pytest.approx([1.0, 4e3, 1e6], rel=1e-3)
     # All particles in one place, as odometry without noise leaves them: only the heading is widened.
-    root = widening(np.diag([0.0, 0.0, 0.3]), np.diag([0.0, 0.0, 1e-4]), kept, given_share, whole)
+    root = witness.widening(np.diag([0.0, 0.0, 0.3]), np.diag([0.0, 0.0, 1e-4]), 0.98, 0.4)
     assert np.isfinite(root).all()
     assert root[2, 2] >= 1.0
 
@@ -184,6 +217,28 @@ def test_it_tracks_on_an_occupancy_grid() -> None:
         belief = localizer.step(sim.step(Twist(0.3, 0.4 if step % 60 < 30 else -0.4)))
         if step > 20:
             assert math.hypot(belief.pose.x_m - sim.truth.x_m, belief.pose.y_m - sim.truth.y_m) < 0.1
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_it_keeps_along_a_corridor_what_its_wheels_tell(seed: int) -> None:
+    """Its walls say nothing of how far along it is, and each scan of them made it forget that: metres off."""
+    walls = np.array([[0, 0, 70, 0], [70, 0, 70, 2.5], [70, 2.5, 0, 2.5], [0, 2.5, 0, 0]], dtype=float)
+    corridor, start = SegmentMap.of(walls), Pose2(15.0, 1.25, 0.0)
+    told = told_of(corridor, start=start, variances=(1e-4, 1e-4, 1e-4), seed=seed)
+    told = replace(told, chart=WorldMap("corridor", corridor.bounds_m, grid=rasterized(corridor, 0.05)))
+    localizer = told.localizer(ParticleFilterLocalizer, MclConfig())
+    sim = alone(robot(sensors(), start=start, seed=seed), chart=walled(corridor))
+    dead_reckoned_m = 0.0
+    for _ in range(700):
+        readings = sim.step(Twist(0.5, 0.0))
+        odometry = readings.by_sensor["odometry"]
+        assert isinstance(odometry, OdometryIncrement)
+        dead_reckoned_m += odometry.distance_m
+        belief = localizer.step(readings)
+    assert belief.status is BeliefStatus.LOCALIZED
+    off_m = abs(start.x_m + dead_reckoned_m - sim.truth.x_m)
+    assert abs(belief.pose.x_m - sim.truth.x_m) < off_m + 0.05
+    assert math.sqrt(belief.cov[0, 0]) < 0.2
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])

@@ -205,16 +205,13 @@ def moments(poses: FloatArray, weights: FloatArray, mean: FloatArray, cov: Float
 
 
 @kernel
-def spread_out(
-    poses: FloatArray, mean: FloatArray, root: FloatArray, h: float, growth: float, normals: FloatArray
-) -> None:
-    """Move resampled particles (N, 3) apart in place by a kernel that leaves the mean as it is.
+def spread_out(poses: FloatArray, mean: FloatArray, root: FloatArray, h: float, normals: FloatArray) -> None:
+    """Move resampled particles (N, 3) apart in place by a kernel that leaves mean and covariance as they are.
 
-    Each is drawn towards the mean by a = sqrt(growth - h^2) and moved by h times a normal variable with the
-    cloud's covariance, whose square root is ``root`` (3, 3) (Liu and West 2001, sect. 10.3.3). The covariance
-    grows by the factor ``growth``, which 1 leaves as it is.
+    Each is drawn towards the mean by a = sqrt(1 - h^2) and moved by h times a normal variable with the
+    cloud's covariance, whose square root is ``root`` (3, 3) (Liu and West 2001, sect. 10.3.3).
     """
-    a = math.sqrt(growth - h * h)
+    a = math.sqrt(1.0 - h * h)
     for i in range(poses.shape[0]):
         n0, n1, n2 = h * normals[i, 0], h * normals[i, 1], h * normals[i, 2]
         dt = wrap(poses[i, 2] - mean[2])

@@ -122,14 +122,11 @@ class LikelihoodField:
         entries = np.minimum(away / self._step_m + 0.5, len(self._table) - 1.0)
         return np.asarray(self._table[entries.astype(np.int64)])
 
-    def kept(self, moved_m: float, turned_rad: float) -> float:
-        """Share of what a filter knows that stays beside a scan taken after a move; 0: the two simply add up.
+    def alike(self, moved_m: float, turned_rad: float) -> float:
+        """How much the error of a scan taken after a move is the last one's: from 0, not at all, to 1.
 
         A grid's errors are the same from scan to scan while the same cells are in sight: such scans are no
-        independent witnesses. What is known already and what the scan says are joined as if nobody knew how
-        much of both is the same: ``known^kept scan^(1 - kept)`` (covariance intersection: Julier and
-        Uhlmann 1997; for densities Hurley 2002). No number of scans from one place then tells more than one
-        of them.
+        independent witnesses.
         """
         if not self.errs_alike:
             return 0.0

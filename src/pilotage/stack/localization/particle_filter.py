@@ -38,7 +38,7 @@ from pilotage.stack.localization.odometry_watch import (
     OdometryWatch,
 )
 from pilotage.stack.localization.relocalization import STDS, Relocalization
-from pilotage.stack.localization.same_witness import widening
+from pilotage.stack.localization.same_witness import SameWitness
 from pilotage.stack.localization.self_check import LEAST_SEEN, ExplainedShare, SelfCheck
 from pilotage.stack.localization.walls_between import WallsBetween
 
@@ -149,7 +149,7 @@ class ParticleFilterLocalizer:
         )
         self._motion = GyroOdometry(robot, self._odometry, self._prediction, journal)
         self._watch, self._check = OdometryWatch(robot, odometry), SelfCheck(refused_share=MOST_BESIDE)
-        self._doubt = OdometryDoubt()
+        self._doubt, self._witness = OdometryDoubt(), SameWitness()
         self._blind = bool(initial.cov[2, 2] > LINEAR_RAD**2)
         self._unexplained, self._found = 0, True
         self._moved, self._alike = (0.0, 0.0), 0
@@ -240,6 +240,7 @@ class ParticleFilterLocalizer:
         self._poses = _draw(initial, self._config.most_particles, self._rng)
         self._wanted, self._blind, self._alike = self._config.most_particles, False, 0
         self._doubt.forget()
+        self._witness.forget()
         return self._unweighted()
 
     def _move(self, odometry: OdometryIncrement) -> None:
@@ -300,10 +301,10 @@ class ParticleFilterLocalizer:
     def _weigh(self, points: FloatArray, prior_cov: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Weigh and resample the cloud by a scan's end points (K, 2) in the robot's frame; returns the
         weighted mean and covariance."""
-        kept, self._rounds = self._field.kept(*self._moved), 0
+        alike, self._rounds = self._field.alike(*self._moved), 0
         self._moved = (0.0, 0.0)
-        growth, whole = 1.0 / kept if kept > 0.0 else 1.0, self._field.independent_share
-        share = whole * (1.0 - kept)
+        whole = self._field.independent_share
+        share = whole * (1.0 - alike)
         remaining, narrowing = share, True
         while narrowing:
             self._rounds += 1
@@ -311,7 +312,7 @@ class ParticleFilterLocalizer:
             part, narrowing = max(remaining, 0.0), False
             if self._rounds < self._config.most_rounds:
                 enough = self._config.effective_share * self._poses.shape[0]
-                most = whole if kept > 0.0 else remaining
+                most = whole if alike > 0.0 else remaining
                 narrowed = particles.largest_exponent(likelihoods, most, enough)
                 if narrowed < most:
                     part, narrowing = narrowed, True
@@ -319,10 +320,10 @@ class ParticleFilterLocalizer:
             self._effective = particles.effective_count(likelihoods, part)
             weights = particles.normalized(likelihoods, part)
             moments = _moments(self._poses, weights)
-            self._resample(weights, *moments, growth)
-            growth = 1.0
-        if kept > 0.0 and remaining < 0.0:
-            moments = self._widen(*moments, widening(prior_cov, moments[1], kept, share - remaining, whole))
+            self._resample(weights, *moments)
+        if alike > 0.0:
+            wider = self._witness.widening(prior_cov, moments[1], alike, (share - remaining) / whole)
+            moments = self._widen(*moments, wider)
         return moments
 
     def _widen(self, mean: FloatArray, cov: FloatArray, wider: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -387,14 +388,14 @@ class ParticleFilterLocalizer:
         if beside and not self._sharp.tell(at_wall / beside, self._found, beside / len(self._picked)):
             self._check.alarm(t_s)
 
-    def _resample(self, weights: FloatArray, mean: FloatArray, cov: FloatArray, growth: float) -> None:
+    def _resample(self, weights: FloatArray, mean: FloatArray, cov: FloatArray) -> None:
         config = self._config
         count = min(max(self._wanted, config.least_particles), config.most_particles)
         drawn = particles.low_variance_indices(weights, count, float(self._rng.random()))
         self._poses = self._poses[drawn]
         normals = self._rng.standard_normal((count, 3))
         root = np.asarray(np.linalg.cholesky(cov), dtype=np.float64)
-        particles.spread_out(self._poses, mean, root, config.spread, growth, normals)
+        particles.spread_out(self._poses, mean, root, config.spread, normals)
         bins = particles.occupied_bins(self._poses, config.bin_m, config.bin_rad)
         self._wanted = math.ceil(particles.kld_count(bins, config.kld_error, self._quantile))
 
