@@ -213,3 +213,41 @@ def test_no_weak_brakes_carry_it_into_a_wall(tmp_path: Path, truly: dict[str, fl
         run = run_mission(mission_of(mission), save=False)
         assert run.metrics["collisions"] == 0
         assert "stuck" in str(run.metrics["reason"])
+
+
+def test_weak_brakes_slow_down_before_a_wall_rather_than_plan_anew(tmp_path: Path) -> None:
+    """Goal drove 1 m/s at a goal before a wall, was refused, planned the same anew thrice and backed out."""
+    walls_m = [[0, 0, 9, 0], [9, 0, 9, 6], [9, 6, 0, 6], [0, 6, 0, 0]]
+    hall = {"map": "hall", "bounds_m": [0, 0, 9, 6], "walls_m": walls_m}
+    (tmp_path / "hall.yaml").write_text(yaml.safe_dump(hall))
+    mission = {
+        "mission": "before-a-wall",
+        "world": {
+            "map": str(tmp_path / "hall.yaml"),
+            "start": {"x_m": 2.0, "y_m": 3.0},
+            "goal": {"x_m": 8.2, "y_m": 3.3},
+        },
+        "robot": {
+            "footprint": {"radius_m": 0.25},
+            "motion": {"name": "differential-drive", **WEAK},
+            "sensors": {
+                "odometry": {"name": "wheel-odometry", "rate_hz": 10},
+                "laser": {"name": "lidar", "rate_hz": 10, "beams": 360, "field_of_view_rad": 6.28},
+            },
+        },
+        "task": "reach",
+        "stack": {
+            "navigator": "goal",
+            "localizer": "laser",
+            "planner": "theta-star",
+            "smoother": "shortcut",
+            "local_planner": {"name": "dubins", "speed_m_s": 1.0},
+            "controller": "kanayama",
+            "mapper": "obstacle-layer",
+            "escape": "back-out",
+        },
+        "run": {"dt_s": 0.1, "time_limit_s": 60, "seed": 1},
+    }
+    metrics = run_mission(mission_of(mission), save=False).metrics
+    assert metrics["success"] and metrics["collisions"] == 0
+    assert (metrics["replans"], metrics["escapes"]) == (0, 0)
