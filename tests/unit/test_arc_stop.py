@@ -249,5 +249,6 @@ def test_weak_brakes_slow_down_before_a_wall_rather_than_plan_anew(tmp_path: Pat
         "run": {"dt_s": 0.1, "time_limit_s": 60, "seed": 1},
     }
     metrics = run_mission(mission_of(mission), save=False).metrics
-    assert metrics["success"] and metrics["collisions"] == 0
+    assert metrics["success"]
+    assert metrics["collisions"] == 0
     assert (metrics["replans"], metrics["escapes"]) == (0, 0)

@@ -74,6 +74,11 @@ class ArcStop:
         if self._steers and command.v_m_s != 0.0:
             self._per_m = self._bends(command)
 
+    @property
+    def rolls_on(self) -> bool:
+        """Whether it is faster than it can stop within a step."""
+        return self._rolls and math.hypot(self._going.v_m_s, self._going.lateral_m_s) > self._slows_m_s
+
     def leaving(self, command: Twist) -> Twist:
         """What is to leave for a command: itself, or of a stop what brakes along the arc."""
         return self._braked() if command == STOP and self._rolls and not self._steers else command

@@ -67,6 +67,11 @@ class LastWord:
         self._since_s, self._refused_s = min(self._since_s, self._t_s), self._t_s
         return False
 
+    @property
+    def rolls_on(self) -> bool:
+        """Whether it takes the robot longer than a step to stop: what is refused may be its speed alone."""
+        return self._arc_stop.rolls_on
+
     def no_faster(self, command: Twist) -> tuple[Twist, ...]:
         """What to ask about instead of a refused command while the robot rolls, the most like it first."""
         return self._arc_stop.no_faster(command)

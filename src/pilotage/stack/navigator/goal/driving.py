@@ -85,7 +85,8 @@ def drive(context: Context, state: Driving, readings: Readings, belief: Belief) 
         return give_way(context, move, pose)
     if context.has_room(move.command):
         return move
-    slower = _slower(context, move.command, context.has_room) if isinstance(move.state, Following) else None
+    may_brake = isinstance(move.state, Following) and context.rolls_on
+    slower = _slower(context, move.command, context.has_room) if may_brake else None
     if slower is not None:
         return Move(move.state, slower)
     if not context.meets_walls(move.command, pose):
