@@ -160,10 +160,10 @@ class OpenFloor:
         """
         found = self.draw(rng, apart_from)
         if found is None:
+            beside = " and apart from the others, as a goal is from its start" if apart_from else ""
             raise InputError(
-                f"random place: found none with {self.clearance_m:g} m of clearance"
-                + (" that is apart from the others'" if apart_from else "")
-                + "; ask for less"
+                f"world: expected a random place {self.clearance_m:g} m from walls{beside}, found none; "
+                "ask for less clearance_m"
             )
         return found
 

@@ -123,14 +123,17 @@ def filter_rates(
 
 
 @kernel
-def weigh(costs: FloatArray, prior: FloatArray, errors: FloatArray) -> int:
+def weigh(costs: FloatArray, prior: FloatArray, errors: FloatArray, holds_on: bool) -> int:
     """Add errors (H,), each ``MOST_ERROR`` at most, to costs that fade towards ``prior``; in place.
+
+    Who ``holds_on`` forgets no more than the errors differ: nothing at a steady speed, which tells nothing.
 
     Returns the index of the least. In one call: those of numpy cost more than the predictions themselves.
     """
     best = 0
+    kept = 1.0 - (1.0 - FORGET) * min(errors.max() - errors.min(), 1.0) if holds_on else FORGET
     for h in range(costs.shape[0]):
-        costs[h] = prior[h] + FORGET * (costs[h] - prior[h]) + min(errors[h], MOST_ERROR)
+        costs[h] = prior[h] + kept * (costs[h] - prior[h]) + min(errors[h], MOST_ERROR)
         if costs[h] < costs[best]:
             best = h
     return best

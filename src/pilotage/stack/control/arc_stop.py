@@ -8,6 +8,7 @@ from pilotage.core.types import STOP, Twist
 from pilotage.models.motion.rates import approach
 from pilotage.models.odometry import increment_variances
 from pilotage.sensors.readings import OdometryIncrement, Readings
+from pilotage.stack.control.brakes import Brakes
 from pilotage.stack.control.own_motion import odometry_of_every_step
 from pilotage.stack.knowledge import RobotKnowledge
 
@@ -23,15 +24,15 @@ class ArcStop:
     Who checks a command checks the stop after it along its arc. Told (0, 0) a robot whose brakes are weaker
     than its steering drops its turn at once and rolls straight on, off that arc. So it is told each step's
     speed of the braking, and turn rate and lateral speed in proportion: a twist times a number has the same
-    radius. It reckons that rates follow what it was told as fast as its data sheet lets them, which is what
-    they will do when a command acts, ``delay_s`` later; where its odometry tells that they do not, as against
-    a wall, those that it tells. Robots that steer wheels, which stay where they are in a stop, and those that
-    stop within a step are told (0, 0).
+    radius. It reckons that rates follow what it was told as fast as its data sheet, or its ``brakes`` as they
+    have proved, let them, which is what they will do when a command acts, ``delay_s`` later; where its
+    odometry tells that they do not, as against a wall, those that it tells. Robots that steer wheels, which
+    stay where they are in a stop, and those that stop within a step are told (0, 0).
     """
 
-    def __init__(self, robot: RobotKnowledge) -> None:
+    def __init__(self, robot: RobotKnowledge, brakes: Brakes) -> None:
         motion = robot.motion
-        self._motion, self._dt_s = motion, robot.dt_s
+        self._motion, self._dt_s, self._brakes = motion, robot.dt_s, brakes
         self._slows_m_s = motion.braking_m_s2 * robot.dt_s
         self._rolls = self._slows_m_s < motion.top_speed_m_s
         self._steers = motion.least_turning_radius_m > 0.0
@@ -45,6 +46,11 @@ class ArcStop:
         """Begin a step with its readings."""
         if not self._rolls or self._odometry is None:
             return
+        slows_m_s = self._brakes.likely_m_s2 * self._dt_s
+        if slows_m_s != self._slows_m_s:
+            # With other brakes it was not where it was reckoned to be.
+            ahead_m_s, lateral_m_s = self._brakes.rates_m_s
+            self._slows_m_s, self._going = slows_m_s, Twist(ahead_m_s, self._going.w_rad_s, lateral_m_s)
         name, sheet = self._odometry
         told, going, dt_s = readings.by_sensor.get(name), self._going, self._dt_s
         if not isinstance(told, OdometryIncrement):
@@ -67,6 +73,11 @@ class ArcStop:
         self._going = self.follows(command)
         if self._steers and command.v_m_s != 0.0:
             self._per_m = self._bends(command)
+
+    @property
+    def rolls_on(self) -> bool:
+        """Whether it is faster than it can stop within a step."""
+        return self._rolls and math.hypot(self._going.v_m_s, self._going.lateral_m_s) > self._slows_m_s
 
     def leaving(self, command: Twist) -> Twist:
         """What is to leave for a command: itself, or of a stop what brakes along the arc."""

@@ -7,6 +7,7 @@ import math
 from pilotage.core.types import STOP, FloatArray, Twist
 from pilotage.sensors.readings import Readings
 from pilotage.stack.control.arc_stop import ArcStop
+from pilotage.stack.control.brakes import Brakes
 from pilotage.stack.control.scan_guard import NOTHING, ScanGuard
 from pilotage.stack.knowledge import RobotKnowledge
 
@@ -28,7 +29,8 @@ class LastWord:
     """
 
     def __init__(self, robot: RobotKnowledge) -> None:
-        self._guard, self._arc_stop = ScanGuard(robot), ArcStop(robot)
+        self._brakes = Brakes(robot)
+        self._guard, self._arc_stop = ScanGuard(robot, self._brakes), ArcStop(robot, self._brakes)
         self._left: Twist | None = None
         self._t_s = self._refused_s = 0.0
         self._since_s, self._since_at = math.inf, self._guard.place_m
@@ -37,9 +39,11 @@ class LastWord:
     def take_in(self, readings: Readings) -> None:
         """Begin a step with its readings."""
         if self._left is not None:
+            self._brakes.sent(self._left)
             self._guard.sent(self._left)
             self._arc_stop.sent(self._left)
         self._left, self._t_s = STOP, readings.t_s
+        self._brakes.take_in(readings)
         self._guard.take_in(readings)
         self._arc_stop.take_in(readings)
 
@@ -62,6 +66,11 @@ class LastWord:
             self._since_s, self._since_at = self._t_s, self._guard.place_m
         self._since_s, self._refused_s = min(self._since_s, self._t_s), self._t_s
         return False
+
+    @property
+    def rolls_on(self) -> bool:
+        """Whether it takes the robot longer than a step to stop: what is refused may be its speed alone."""
+        return self._arc_stop.rolls_on
 
     def no_faster(self, command: Twist) -> tuple[Twist, ...]:
         """What to ask about instead of a refused command while the robot rolls, the most like it first."""

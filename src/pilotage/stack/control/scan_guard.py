@@ -15,6 +15,7 @@ from pilotage.kernels.geometry.solids import Outline
 from pilotage.sensors.joint_lidar import JointLidarConfig
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import LidarScan, Readings
+from pilotage.stack.control.brakes import Brakes
 from pilotage.stack.control.own_motion import OwnMotion
 from pilotage.stack.knowledge import RobotKnowledge
 
@@ -123,15 +124,15 @@ class ScanGuard:
     for three of its periods, as seen from where the robot has moved to since: the edge of a post that is
     passed is hit by few beams, and a laser may be slower than the robot's steps. The last scan counts on
     where no other comes.
-    Whoever gets no nearer to what he touches, or is about to, may. Where no laser looks it knows nothing, and
-    of what comes up to the robot by itself no more than where it was.
+    It stops by its brakes as they have proved. Whoever gets no nearer to what he touches, or is about to,
+    may. Where no laser looks it knows nothing, and of what comes up to the robot by itself no more than where
+    it was.
     """
 
-    def __init__(self, robot: RobotKnowledge) -> None:
-        self._limits = robot.motion
+    def __init__(self, robot: RobotKnowledge, brakes: Brakes) -> None:
+        self._limits, self._brakes = robot.motion, brakes
         self._outline, self._radius_m = robot.footprint.outline, robot.footprint.radius_m
         motion = robot.motion
-        self._braking_m_s2 = min(motion.braking_m_s2, motion.top_speed_m_s / robot.dt_s)
         self._slowing_rad_s2 = min(motion.turn_acceleration_rad_s2, motion.top_turn_rate_rad_s / robot.dt_s)
         self._reacts_s = robot.dt_s + motion.delay_s
         # Their joint scan leaves out what the middle between them does not see.
@@ -181,7 +182,7 @@ class ScanGuard:
         if speed_m_s == 0.0 and turn_rate == 0.0:
             return NOTHING
         # At full speed as far as while it brakes.
-        stops_s = max(speed_m_s / self._braking_m_s2, turn_rate / self._slowing_rad_s2)
+        stops_s = max(speed_m_s / self._brakes.sure_m_s2, turn_rate / self._slowing_rad_s2)
         until_s, here = self._reacts_s + 0.5 * stops_s, self._here
         within_m = self._radius_m + TOUCH_M + speed_m_s * until_s
         near = [(laser, seen) for laser in self._lasers if (seen := laser.near(within_m, here)) is not None]
@@ -199,7 +200,7 @@ class ScanGuard:
     def _faster_than(self, moved_m: float, turned_rad: float) -> tuple[float, float]:
         """The most speed and turn rate that comes of what it moved in a step, until it reacts anew."""
         for_s = self._reacts_s + self._dt_s
-        gains_m_s, gains_rad_s = self._braking_m_s2 * for_s, self._slowing_rad_s2 * for_s
+        gains_m_s, gains_rad_s = self._brakes.likely_m_s2 * for_s, self._slowing_rad_s2 * for_s
         return moved_m / self._dt_s + gains_m_s, abs(turned_rad) / self._dt_s + gains_rad_s
 
     def _can_turn(self, w_rad_s: float, speed_m_s: float) -> float:

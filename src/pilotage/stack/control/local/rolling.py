@@ -16,7 +16,7 @@ from pilotage.kernels.control.merged_means import without_passed
 from pilotage.kernels.control.motion_limits import Drive
 from pilotage.kernels.geometry.motion import wrap
 from pilotage.kernels.grids.distance import nearest_marked
-from pilotage.stack.control.local.answer import Answer
+from pilotage.stack.control.answer import Answer
 from pilotage.stack.control.local.body import dense_m, make_body
 from pilotage.stack.control.local.role import LocalLimits, LocalView
 from pilotage.stack.control.local.rolling_config import PEOPLE_FADE_HITS, RollingConfig

@@ -187,9 +187,18 @@ class Context(Standing):
         self.stall.restart(self.t_s)
         return True
 
+    def has_room(self, command: Twist) -> bool:
+        """Whether the lasers show room for a command, whatever the map says."""
+        return self._last_word.allows(command)
+
+    @property
+    def rolls_on(self) -> bool:
+        """Whether it takes longer than a step to stop."""
+        return self._last_word.rolls_on
+
     def meets_walls(self, command: Twist, pose: Pose2) -> bool:
-        """Whether a laser shows no room for a command, whatever the map says; what it shows is mapped."""
-        if self._last_word.allows(command):
+        """Whether a laser shows no room for a command; what it shows is mapped."""
+        if self.has_room(command):
             return False
         self.own_map.show(pose.placed(self._last_word.shown_m))
         return True

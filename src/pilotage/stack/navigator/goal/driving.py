@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import TypeAlias
 
 from pilotage.core.types import STOP, Pose2, Twist
@@ -20,7 +22,7 @@ ALIGNED_RAD = 0.1
 """Turned on the spot until this near to the plan's heading."""
 
 SHARES = 0.5, 0.25, 0.125
-"""Of a command's speed, tried where the map leaves no room for all of it."""
+"""Of a command's speed, tried where the map leaves no room for all of it, or the lasers show none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +83,12 @@ def drive(context: Context, state: Driving, readings: Readings, belief: Belief) 
     move = _guarded(context, state, readings, pose)
     if context.waits(move.command, pose):
         return give_way(context, move, pose)
+    if context.has_room(move.command):
+        return move
+    may_brake = isinstance(move.state, Following) and context.rolls_on
+    slower = _slower(context, move.command, context.has_room) if may_brake else None
+    if slower is not None:
+        return Move(move.state, slower)
     if not context.meets_walls(move.command, pose):
         return move
     if context.among_people:
@@ -117,7 +125,7 @@ def _guarded(context: Context, state: Driving, readings: Readings, pose: Pose2) 
         turn = Twist(0.0, move.command.w_rad_s)
         return Move(move.state, turn if _allows(context, pose, turn) else STOP)
     tried = context.again > 0 and context.planned_here(pose)
-    slower = _slower(context, pose, move.command) if tried else None
+    slower = _slower(context, move.command, partial(_allows, context, pose)) if tried else None
     if slower is not None:
         return Move(move.state, slower)
     resumes = _anew(context, move.state)
@@ -130,14 +138,15 @@ def _allows(context: Context, pose: Pose2, command: Twist) -> bool:
     return context.guard.allows(command, pose, own.barriers, own.circles_m, room_m)
 
 
-def _slower(context: Context, pose: Pose2, command: Twist) -> Twist | None:
+def _slower(context: Context, command: Twist, allows: Callable[[Twist], bool]) -> Twist | None:
     """A share of the command for which there is room: what is looked at is the arc that it would go on with.
 
-    The curve that it follows keeps its distance; beside a corner the arc of its first metre need not.
+    The curve that it follows keeps its distance; beside a corner the arc of its first metre need not. Weak
+    brakes come before a wall that is no nearer to the path than it may be too fast to stop.
     """
     for share in SHARES:
         slower = Twist(share * command.v_m_s, share * command.w_rad_s, share * command.lateral_m_s)
-        if _allows(context, pose, slower):
+        if allows(slower):
             context.follower.hold(1.0 - share)
             return slower
     return None

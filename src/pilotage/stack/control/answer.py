@@ -26,20 +26,23 @@ class Answer:
     Kalman filter of the rates (multiple-model estimation: Magill 1965). Accelerating tells of braking here:
     one share holds for both, which is wrong where brakes alone are worn. Rates are those of the likeliest
     model: what the odometry says of one step alone may be off by a tenth, and braking begins late by a fifth.
+
+    It forgets from step to step, or ``holds_on`` to what it learned while nothing tells of it.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, shares: tuple[float, ...] = SHARES, *, holds_on: bool = False) -> None:
         self._room = np.empty((ROOM, 3))
         self._sent = self._room[:0]
         """(N, 3) time, speed and turn rate: a part of the room."""
         self._begin = 0
-        self._pairs = [(share, delay) for share in SHARES for delay in DELAYS]
+        self._pairs = [(share, delay) for share in shares for delay in DELAYS]
         self._hypotheses = np.array(self._pairs)
         self._prior = PRIOR * np.abs(self._hypotheses - 1.0).sum(axis=1)
         self._costs = self._prior.copy()
         self._choose(int(np.argmin(self._costs)))
         self._bank = np.zeros((len(self._pairs), 6))
         self._learned_s: float | None = None
+        self._holds_on = holds_on
 
     def _choose(self, likeliest: int) -> None:
         """``share`` of the data sheet's accelerations, ``delay_factor`` of its delay, as they seem."""
@@ -79,7 +82,7 @@ class Answer:
                 self._hypotheses,
                 DOUBT_STD,
             )
-            self._choose(weigh(self._costs, self._prior, errors))
+            self._choose(weigh(self._costs, self._prior, errors, self._holds_on))
         self._learned_s = t_s
 
     @property
