@@ -108,7 +108,7 @@ def joined(
     witness: SameWitness, prior: FloatArray, scan: FloatArray, alike: float, given: float
 ) -> FloatArray:
     """Information (3, 3) that is left after a scan of that information, let in with a share of its weight."""
-    posterior = np.linalg.inv(np.linalg.inv(prior) + given * scan)
+    posterior: FloatArray = np.asarray(np.linalg.inv(np.linalg.inv(prior) + given * scan), dtype=np.float64)
     root = witness.widening(prior, posterior, alike, given)
     left = root @ posterior @ root.T
     assert (np.linalg.eigvalsh(left - posterior) >= -1e-9 * np.linalg.norm(posterior)).all(), "never narrower"
