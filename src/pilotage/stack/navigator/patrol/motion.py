@@ -180,6 +180,10 @@ class Motion:
             # Beside who stands where it wants to be it goes around him, on either side, and that will do.
             self.taken = at is not None and bool(np.hypot(*(still - at).T).min() < body_m)
             lane_m *= not self.taken
+        if len(discs):
+            # The nodes around it stay free however close somebody is: else no path begins there.
+            away_m = np.hypot(*(discs[:, :2] - (pose.x_m, pose.y_m)).T)
+            discs[:, 2] = np.minimum(discs[:, 2], away_m - math.sqrt(0.5) * roadmap.spacing_m)
         if at is None or self.taken:
             then = -1
         limits = self._limits_ahead(time, then)
