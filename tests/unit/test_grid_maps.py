@@ -283,6 +283,13 @@ class TestRosMaps:
         pixels, alpha = np.array([[255, 255, 0]], np.uint8), np.array([[255, 254, 0]], np.uint8)
         assert RosMap(file, pixels, alpha).grid.cells.tolist() == [[0, -1, -1]]
 
+    def test_an_empty_image_is_called_so(self, tmp_path: Path) -> None:
+        """As one that a repository keeps elsewhere leaves: it was of another format."""
+        (tmp_path / "a.pgm").write_bytes(b"")
+        (tmp_path / "map.yaml").write_text("image: a.pgm\nresolution: 0.05\norigin: [0, 0, 0]\n")
+        with pytest.raises(InputError, match="expected a PNG, PGM or other image, found an empty file"):
+            read_grid(tmp_path / "map.yaml")
+
     @pytest.mark.parametrize(
         ("change", "match"),
         [

@@ -23,7 +23,7 @@ from pilotage.maps.world_map import WorldMap
 from pilotage.stack.patrol.derive import DerivationConfig, derive_drivable, derive_graph
 from pilotage.stack.patrol.graph import PatrolGraph
 from pilotage.stack.patrol.graph_file import on_floor, read_patrol_graph
-from pilotage.stack.patrol.roadmap import Roadmap
+from pilotage.stack.patrol.roadmap import MOST_NODES, Roadmap, usual_spacing_m
 from pilotage.stack.patrol.tours import Round, spread
 
 PAIR = "2 100 80 0.1 1 2\n\n0 10 20 1 1 E 30\n\n1 40 20 1 0 W 34"
@@ -291,6 +291,19 @@ def test_straight_on_through_the_middle_of_a_door_leads_nearer(angle_rad: float)
     for x, y in middle.tolist():
         on_x, on_y = x + 0.05 * along[0], y + 0.05 * along[1]
         assert eikonal.value_at(on_x, on_y, field, 2.0) < eikonal.value_at(x, y, field, 2.0)
+
+
+def test_on_a_large_map_nodes_are_farther_apart() -> None:
+    """A golf course of 320 m x 236 m was refused, though 0.2 m between nodes show each gap for a robot."""
+    assert usual_spacing_m((0.0, 0.0, 60.0, 40.0), 0.38) == 0.15
+    spacing_m = usual_spacing_m((-10.0, 5.0, 309.5, 241.2), 0.28)
+    assert spacing_m == 0.2
+    assert (319.5 / spacing_m) * (236.2 / spacing_m) <= MOST_NODES
+    # Where they would step over gaps it is refused as before.
+    assert usual_spacing_m((0.0, 0.0, 2000.0, 2000.0), 0.38) == 0.15
+    large = WorldMap("field", (0.0, 0.0, 2000.0, 2000.0), passage(1.2).geometry)
+    with pytest.raises(InputError, match=r"expected at most 2000000 nodes on a map of 2000\.0 x 2000\.0 m"):
+        Roadmap(large, np.array([[2.0, 2.5]]), np.zeros((0, 2)), 0.38, 1.0, 0.15, 0.5, 0.35)
 
 
 def test_where_there_is_room_nodes_are_as_far_apart_as_asked_for() -> None:

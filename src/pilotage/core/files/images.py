@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -46,7 +47,8 @@ def opened_image(path: Path, what: str = "an image") -> Iterator[Image.Image]:
                     raise too_large(f"{where} ({columns} x {rows} pixels)", most, size)
                 yield image
         except UnidentifiedImageError:
-            raise InputError(f"{where}: expected a PNG, PGM or other image, found another format") from None
+            found = "another format" if file.seek(0, os.SEEK_END) else "an empty file"
+            raise InputError(f"{where}: expected a PNG, PGM or other image, found {found}") from None
         except (*_DAMAGED, Image.DecompressionBombError) as error:
             raise InputError(f"{where}: cannot be read ({in_words(error)}); it may be cut short") from None
         finally:

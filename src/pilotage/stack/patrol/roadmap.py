@@ -21,7 +21,9 @@ from pilotage.stack.patrol.nodes import Ground
 
 STEP_M = 0.25
 """Of paths."""
-FINER, MOST_NODES = (1, 2, 4), 2_000_000
+SPACING_M, MOST_NODES = 0.15, 2_000_000
+"""Between nodes where nobody asks for another, and how many they may be."""
+FINER = (1, 2, 4)
 """Nodes may lie beside a passage that the body just fits through, or one by one in it: then they lie so many
 times as near."""
 NEAREST = 6
@@ -319,6 +321,13 @@ class Roadmap:
         """How far a place is from another as the crow flies."""
         x, y = self._places[place]
         return math.hypot(x_m - x, y_m - y)
+
+
+def usual_spacing_m(bounds_m: tuple[float, float, float, float], clearance_m: float) -> float:
+    """Of the nodes on a map: as wide as it takes for them not to be too many, if passages still show then."""
+    xmin, ymin, xmax, ymax = bounds_m
+    least_m = math.ceil(100.0 * math.sqrt((xmax - xmin) * (ymax - ymin) / MOST_NODES)) / 100.0
+    return least_m if SPACING_M < least_m <= clearance_m else SPACING_M
 
 
 _ROADMAPS: OncePerMap[Roadmap] = OncePerMap()

@@ -37,8 +37,8 @@ class WindowConfig(Config):
 class PatrolNavigatorConfig(Config):
     """What it keeps from walls and from others, when it gives way, how often it talks."""
 
-    spacing_m: Positive = 0.15
-    """Of the nodes that the time to go is worked out on."""
+    spacing_m: Positive | None = None
+    """Of the nodes that the time to go is worked out on. None: 0.15 m, or more where a map is large."""
     plan_margin_m: NonNegative = 0.08
     """Beyond the body, of the places that it plans through."""
     margin_m: NonNegative = 0.06

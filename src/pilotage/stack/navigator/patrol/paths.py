@@ -17,7 +17,7 @@ from pilotage.stack.navigator.patrol.impasses import INSIDE_M, Impasses
 from pilotage.stack.navigator.patrol.motion import Motion
 from pilotage.stack.navigator.patrol.obstructions import WIDER_M, Obstructions, Told
 from pilotage.stack.navigator.patrol.senses import HEARD_PERIODS, TOLD_M, Senses
-from pilotage.stack.patrol.roadmap import Roadmap, roadmap_of
+from pilotage.stack.patrol.roadmap import Roadmap, roadmap_of, usual_spacing_m
 from pilotage.stack.patrol.shut_paths import NONE_SHUT, ShutPaths
 from pilotage.stack.patrol.task import PatrolPlaces, PatrolTask
 
@@ -31,13 +31,14 @@ def roadmap_for(
     config: PatrolNavigatorConfig, robot: RobotKnowledge, chart: WorldMap, places: PatrolPlaces
 ) -> Roadmap:
     """The paths that a robot follows."""
+    clearance_m = robot.radius_m + config.plan_margin_m
     return roadmap_of(
         chart,
         places.vertices_xy_m,
         places.stations_xy_m,
-        robot.radius_m + config.plan_margin_m,
+        clearance_m,
         robot.motion.top_speed_m_s,
-        config.spacing_m,
+        usual_spacing_m(chart.bounds_m, clearance_m) if config.spacing_m is None else config.spacing_m,
         0.5 * places.visit_m,
         config.lane_m,
     )
