@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from pilotage.core.types import Twist
 from pilotage.kernels.control.motion_limits import Drive
 from pilotage.models.odometry import increment_variances
 from pilotage.sensors.readings import OdometryIncrement, Readings
-from pilotage.stack.control.answer import SHARES, Answer
+from pilotage.stack.control.answer import DELAYS, SHARES, Answer
 from pilotage.stack.control.own_motion import odometry_of_every_step
 from pilotage.stack.knowledge import RobotKnowledge
 
@@ -18,6 +20,8 @@ BETWEEN = 0.1
 """Two shares that are below 1."""
 MISSED_STEPS = 1.5
 """It is told of every step, or begins anew."""
+SAME = 0.01
+"""Of top speed, by which commands differ that are one and the same here."""
 
 
 class Brakes:
@@ -25,8 +29,8 @@ class Brakes:
 
     Who speeds up more slowly than its data sheet says brakes more weakly as well (``Answer``): it knows
     before it has to brake. Turn rates tell nothing here: they have limits of their own, or follow the
-    steering.
-    Who brakes within a step has nothing to learn.
+    steering. Who brakes within a step has nothing to learn, nor who has been told one speed for so long that
+    it has come to it whatever its share.
 
     Attributes
     ----------
@@ -47,6 +51,8 @@ class Brakes:
         self._odometry = odometry_of_every_step(robot) if most * dt_s < top_m_s else None
         self._answer, self._t_s = _answer(), 0.0
         self._delay_s, self._dt_s = motion.delay_s, dt_s
+        self._settles_s = top_m_s / (WEAKER[-1] * most) + DELAYS[-1] * motion.delay_s
+        self._told, self._told_s, self._same_m_s = (0.0, 0.0), 0.0, SAME * top_m_s
 
     @property
     def rates_m_s(self) -> tuple[float, float]:
@@ -61,6 +67,8 @@ class Brakes:
         if readings.t_s - self._t_s > MISSED_STEPS * self._dt_s:
             self._answer = _answer()
         self._t_s = readings.t_s
+        if self._t_s - self._told_s > self._settles_s:
+            return
         name, sheet = self._odometry
         told = readings.by_sensor.get(name)
         if not isinstance(told, OdometryIncrement):
@@ -77,8 +85,12 @@ class Brakes:
 
     def sent(self, command: Twist) -> None:
         """A command left in this step."""
-        if self._odometry is not None:
-            self._answer.sent(self._t_s, command.v_m_s, command.lateral_m_s)
+        if self._odometry is None:
+            return
+        self._answer.sent(self._t_s, command.v_m_s, command.lateral_m_s)
+        ahead_m_s, lateral_m_s = self._told
+        if math.hypot(command.v_m_s - ahead_m_s, command.lateral_m_s - lateral_m_s) > self._same_m_s:
+            self._told, self._told_s = (command.v_m_s, command.lateral_m_s), self._t_s
 
 
 def _answer() -> Answer:
