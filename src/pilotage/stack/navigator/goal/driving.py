@@ -89,8 +89,8 @@ def drive(context: Context, state: Driving, readings: Readings, belief: Belief) 
     slower = _slower(context, move.command, context.has_room) if may_brake else None
     if slower is not None:
         return Move(move.state, slower)
-    if not context.meets_walls(move.command, pose):
-        return move
+    # Asked again: what it meets is mapped, not what a share of it does.
+    context.meets_walls(move.command, pose)
     if context.among_people:
         context.follower.hold()
         return Move(move.state, STOP)
