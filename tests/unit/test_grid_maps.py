@@ -21,7 +21,14 @@ from pilotage.maps import memory
 from pilotage.maps.grid_file import read_grid
 from pilotage.maps.grid_image import read_grey, read_hazard_image, write_grey
 from pilotage.maps.moving_ai import read_moving_ai_map, read_scenario
-from pilotage.maps.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid, near_blocked
+from pilotage.maps.occupancy_grid import (
+    FREE,
+    OCCUPIED,
+    UNKNOWN,
+    OccupancyArray,
+    OccupancyGrid,
+    near_blocked,
+)
 from pilotage.maps.ros_map import RosMap, RosMapFile, read_ros_map, write_ros_map
 
 SHAPES = array_shapes(min_dims=2, max_dims=2, min_side=1, max_side=6)
@@ -63,6 +70,22 @@ class TestCells:
     def test_yaw_turns_about_the_corner(self) -> None:
         grid = OccupancyGrid.of(np.zeros((2, 2), np.bool_), 1.0, Pose2(0.0, 0.0, math.pi / 2))
         assert np.allclose(grid.centres_m(np.array([[1, 0], [1, 1]])), [[-0.5, 0.5], [-0.5, 1.5]])
+
+    @given(
+        arrays(np.int8, SHAPES, elements=st.sampled_from([-1, -1, -1, 0, 100])), st.floats(-math.pi, math.pi)
+    )
+    def test_what_is_known_stays_where_it_is(self, cells: OccupancyArray, yaw: float) -> None:
+        """And what is not is left out but for one cell around it."""
+        grid = OccupancyGrid(np.pad(cells, 2, constant_values=UNKNOWN), 0.5, Pose2(3.0, -7.0, yaw))
+        part = grid.known_part()
+        known = np.argwhere(grid.cells != UNKNOWN)
+        if len(known) == 0:
+            assert part is grid
+            return
+        assert part.cells.shape == tuple(np.ptp(known, axis=0) + 3)
+        row, column = part.cells_at(grid.centres_m(known)).T
+        assert (part.cells[row, column] == grid.cells[tuple(known.T)]).all()
+        assert (part.cells != UNKNOWN).sum() == len(known)
 
     def test_values_of_every_kind(self) -> None:
         assert OccupancyGrid.of(np.array([[True, False]]), 1.0).cells.tolist() == [[OCCUPIED, FREE]]

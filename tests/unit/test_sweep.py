@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import itertools
 import math
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -37,10 +38,12 @@ from pilotage.stack.control.own_half import OwnHalf
 from pilotage.stack.interface import Belief
 from pilotage.stack.navigator.trail import Trail
 from pilotage.stack.planning.boustrophedon import BoustrophedonConfig, BoustrophedonPlanner
+from pilotage.stack.planning.node_search import line_length_m
 from pilotage.stack.planning.planner import PlanRequest, PlanResult
 from pilotage.stack.planning.sweep_changes import subdivided
+from pilotage.stack.planning.sweep_detours import completed
 from pilotage.stack.planning.sweep_floor import Sought, covered, rest_of, surely_covered, whole_floor
-from pilotage.stack.planning.sweep_room import Keeping, path_floor
+from pilotage.stack.planning.sweep_room import CELLS, Keeping, path_floor
 from support.missions import MISSIONS
 
 ROOM = [[0, 0, 10, 0], [10, 0, 10, 8], [10, 8, 0, 8], [0, 8, 0, 0]]
@@ -121,13 +124,38 @@ def test_a_clearance_that_would_shut_a_door_is_kept_everywhere_else() -> None:
         "rooms", (0.0, 0.0, 10.0, 8.0), geometry=SegmentMap(walls, NO_DISCS, (0.0, 0.0, 10.0, 8.0))
     )
     told = Floor.of(world, 0.17, 0.02, (1.0, 1.0), exact=True)
-    floor = path_floor(world.field, Keeping(0.17, 0.25, (1.0, 1.0)), 0.24, told)
+    floor = path_floor(world.field, Keeping(0.17, 0.25, (1.0, 1.0)), 0.24, told, CELLS[0])
     assert floor.reachable[floor.cell_of(np.array([1.0, 1.0]))]
     assert floor.reachable[floor.cell_of(np.array([8.0, 4.0]))]
     for beside_a_wall in ((0.2, 4.0), (3.0, 0.2), (5.8, 6.0), (9.8, 4.0)):
         assert not floor.reachable[floor.cell_of(np.array(beside_a_wall))]
     through = floor.reachable & (np.abs(floor.clearance_m - 0.24) < 0.005)
     assert np.abs(floor.middles(through)[:, 0] - 6.0).min() < 0.05, "the door's middle"
+
+
+def test_a_nook_that_coarse_cells_of_a_path_miss_is_swept() -> None:
+    """5 cm to spare, on a floor so large that a path's cells are 4 cm wide; it was left without a word."""
+    side, low, high = 40.0, 12.03, 12.68
+    around = [[0, 0, side, 0], [side, 0, side, side], [side, side, 0, side], [0, side, 0, 0]]
+    walls = np.array([*around, [0, low, 6, low], [0, high, 6, high]])
+    bounds_m = 0.0, 0.0, side, side
+    world = WorldMap("hall", bounds_m, geometry=SegmentMap(walls, NO_DISCS, bounds_m))
+    sought = whole_floor(world.field, Keeping(0.3, 0.33, (20.0, 20.0)), 0.6, 0.012)
+    assert not (sought.floor.reachable & ~sought.must).any()
+
+
+def test_a_detour_begins_where_the_floor_is_near_not_where_a_wall_is_between() -> None:
+    """What a path left lay 1 m from it, behind a wall, and 4 m on this side: around the wall it went."""
+    walls = np.array([*ROOM, [0, 4, 8.8, 4], [2.5, 4, 2.5, 5.5]], dtype=float)
+    bounds_m = 0.0, 0.0, 10.0, 8.0
+    world = WorldMap("rooms", bounds_m, geometry=SegmentMap(walls, NO_DISCS, bounds_m))
+    sought = whole_floor(world.field, Keeping(0.2, 0.25, (1.0, 3.4)), 0.4, 0.012)
+    must = np.zeros_like(sought.must)
+    must[sought.floor.cell_of(np.array([1.0, 4.5]))] = True
+    path = np.array([[1.0, 3.4], [9.4, 3.4], [9.4, 6.0], [4.0, 6.0]])
+    found = completed(replace(sought, must=must), path)
+    assert (covered(sought.floor, found, 0.4) & must).any()
+    assert line_length_m(found) - line_length_m(path) < 9.0
 
 
 @pytest.mark.parametrize("radius_m", [0.172, 0.175, 0.176, 0.21, 0.25])

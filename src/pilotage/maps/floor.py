@@ -175,6 +175,21 @@ class Floor:
             clearance[outside_of(pieces, edge, home)] = -1.0
         return Floor((xmin, ymin), cell_m, radius_m, clearance, reachable)
 
+    def alone(self, field: DistanceField, cell_m: float, inside_xy_m: tuple[float, float]) -> Floor:
+        """The cells around the reachable piece alone, finer where all of the map was too large for that."""
+        margin = math.ceil(self.radius_m / self.cell_m) + 2
+        rows, columns = (
+            slice(max(int(cells.min()) - margin, 0), int(cells.max()) + margin + 1)
+            for cells in np.nonzero(self.reachable)
+        )
+        x0, y0 = self.origin_xy_m
+        origin_m = x0 + columns.start * self.cell_m, y0 + rows.start * self.cell_m
+        at = rows, columns
+        piece = Floor(origin_m, self.cell_m, self.radius_m, self.clearance_m[at], self.reachable[at])
+        if self.cell_m <= cell_m:
+            return piece
+        return Floor.of_field(field, piece.bounds_m, self.radius_m, cell_m, inside_xy_m, exact=True)
+
     def roomy(self, spare_m: float, reach_m: float, inside_xy_m: tuple[float, float]) -> Floor:
         """The floor without what only passages lead to that leave less than ``spare_m`` beside the body.
 
@@ -193,6 +208,12 @@ class Floor:
         row, column = np.nonzero(cells)
         x0, y0 = self.origin_xy_m
         return np.column_stack([x0 + (column + 0.5) * self.cell_m, y0 + (row + 0.5) * self.cell_m])
+
+    @property
+    def bounds_m(self) -> tuple[float, float, float, float]:
+        """xmin, ymin, xmax, ymax of all cells."""
+        (xmin, ymin), (rows, columns) = self.origin_xy_m, self.reachable.shape
+        return xmin, ymin, xmin + columns * self.cell_m, ymin + rows * self.cell_m
 
     @property
     def apart_fraction(self) -> float:

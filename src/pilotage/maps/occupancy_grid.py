@@ -82,6 +82,24 @@ class OccupancyGrid:
         cells[(blocks >= OCCUPIED_FROM).any(axis=(1, 3))] = OCCUPIED
         return OccupancyGrid(cells, self.resolution_m * step, self.origin)
 
+    def known_part(self) -> OccupancyGrid:
+        """The least of it with all that is known, and one cell of what is not on each side that has it.
+
+        All of it where nothing is known.
+        """
+        sides = []
+        for axis, size in ((1, self.rows), (0, self.columns)):
+            known = np.flatnonzero((self.cells != UNKNOWN).any(axis=axis))
+            if not len(known):
+                return self
+            sides.append((max(int(known[0]) - 1, 0), min(int(known[-1]) + 2, size)))
+        (top, bottom), (left, right) = sides
+        if (top, bottom, left, right) == (0, self.rows, 0, self.columns):
+            return self
+        x_m, y_m = self.points_m(np.array([[bottom, left]]))[0].tolist()
+        origin = Pose2(x_m, y_m, self.origin.theta_rad)
+        return OccupancyGrid(self.cells[top:bottom, left:right], self.resolution_m, origin)
+
     @staticmethod
     def of(values: ArrayLike, resolution_m: float, origin: Pose2 = CORNER) -> OccupancyGrid:
         """Build from an array: booleans (True is occupied), per cent with -1, or probabilities.

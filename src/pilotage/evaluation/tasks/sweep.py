@@ -65,12 +65,16 @@ class SweepTask(WatchedTask):
         cell_m = pass_cell_m(self._width_m, radius_m)
         place = start.x_m, start.y_m
         floor = Floor.of(setting.chart, radius_m, cell_m, place, exact=True)
-        # By two cells less than a pass reaches: cells tell where a passage becomes narrow no better.
-        self._whole = floor
-        self._floor = floor.roomy(config.spare_m, 0.5 * self._width_m - 2.0 * floor.cell_m, place)
         self.events += cut_off(floor)
+        self._apart_fraction = self._asked_for(floor, place).apart_fraction
+        self._whole = floor.alone(setting.chart.field, cell_m, place)
+        self._floor = self._asked_for(self._whole, place)
         self._swept: BoolArray = np.zeros_like(self._floor.reachable)
         self._last = np.array([start.x_m, start.y_m])
+
+    def _asked_for(self, floor: Floor, start_xy_m: tuple[float, float]) -> Floor:
+        # By two cells less than a pass reaches: cells tell where a passage becomes narrow no better.
+        return floor.roomy(self._config.spare_m, 0.5 * self._width_m - 2.0 * floor.cell_m, start_xy_m)
 
     def step(self, t_s: float, attempts: Sequence[Attempt]) -> str | None:
         """Sweep on."""
@@ -98,7 +102,7 @@ class SweepTask(WatchedTask):
         taken = within_reach | (sweepable(self._whole, self._width_m) & self._swept)
         area_m2 = np.count_nonzero(taken) * floor.cell_m**2
         metrics |= {
-            "floor_apart_fraction": floor.apart_fraction,
+            "floor_apart_fraction": self._apart_fraction,
             "swept_fraction": swept,
             "swept_rim_fraction": self._share(within_reach & ~floor.reachable),
             "sweep_ratio": float(robot.driven_m * self._width_m / area_m2),

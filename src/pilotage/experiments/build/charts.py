@@ -199,7 +199,8 @@ def _sheet(sheet: SheetFile, name: str, markings: MarkingsConfig) -> WorldMap:
 
 
 def _grid(path: Path, resolution_m: float | None = None, origin: Pose2 | None = None) -> WorldMap:
-    grid = read_grid(path, resolution_m, origin)
+    # Programs that draw maps leave much of the image grey: cells are for where somebody may be.
+    grid = read_grid(path, resolution_m, origin).known_part()
     return WorldMap(path.stem, bounds_of(grid), grid=grid)
 
 

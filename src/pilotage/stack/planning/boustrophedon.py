@@ -145,9 +145,7 @@ def _lines(
 ) -> FloatArray:
     """(N, 2) a path from start to goal that sweeps nearly everything, by lines in one direction."""
     width_m, inner = sought.width_m, sought.inner
-    (xmin, ymin), (rows, columns) = inner.origin_xy_m, inner.reachable.shape
-    bounds_m = xmin, ymin, xmin + columns * inner.cell_m, ymin + rows * inner.cell_m
-    cells_of_lines = in_cells_of(inner, sweep_cell_m(bounds_m, width_m))
+    cells_of_lines = in_cells_of(inner, sweep_cell_m(inner.bounds_m, width_m))
     needed = [
         [line for line in lines if (covered(sought.floor, line, width_m) & sought.must).any()]
         for lines in sweep_lines(cells_of_lines, width_m, along_y)

@@ -93,7 +93,10 @@ def _pieces(floor: Floor, missing: BoolArray, width_m: float) -> list[FloatArray
 
 
 def _with_detours(floor: Floor, path: FloatArray, places: FloatArray) -> FloatArray:
-    """The path by way of further places: there and back from where it comes nearest to each in sight."""
+    """The path by way of further places: there and back from where it comes nearest to each in sight.
+
+    Where none of it is in sight the nearest may lie behind a wall: what is nearest by the floor counts.
+    """
     for place in places:
         a, step = path[:-1], np.diff(path, axis=0)
         share = ((place - a) * step).sum(axis=1) / np.maximum((step**2).sum(axis=1), 1e-12)
@@ -101,7 +104,13 @@ def _with_detours(floor: Floor, path: FloatArray, places: FloatArray) -> FloatAr
         there_m = np.hypot(*(foot - place).T)
         near = np.argsort(there_m, kind="stable")[:30].tolist()
         seen = next((k for k in near if floor.is_clear(foot[k], place)), None)
-        k = near[0] if seen is None else seen
-        out = joined(floor, a[k], place) if seen is None else np.vstack([foot[k], place])
+        k = _nearest_by_floor(floor, foot, place) if seen is None else seen
+        out = joined(floor, foot[k], place) if seen is None else np.vstack([foot[k], place])
         path = np.insert(path, k + 1, np.vstack([out, out[-2::-1]]), axis=0)
     return path
+
+
+def _nearest_by_floor(floor: Floor, points: FloatArray, place: FloatArray) -> int:
+    """Which of points (N, 2) has the shortest path to a place."""
+    away = floor.costs_from(place).reshape(floor.reachable.shape)
+    return int(np.argmin(away[floor.cells_of(points)]))

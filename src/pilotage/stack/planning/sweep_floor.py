@@ -13,7 +13,7 @@ from pilotage.core.types import BoolArray, FloatArray
 from pilotage.kernels.patrol.swept import mark_swept
 from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.floor import Floor, pass_cell_m, sweepable
-from pilotage.stack.planning.sweep_room import Keeping, path_floor
+from pilotage.stack.planning.sweep_room import CELLS, Keeping, path_floor
 
 STEP_M = 0.002
 """Stretches of a trail on which its radius differs by less are taken together, with the least of it."""
@@ -51,10 +51,16 @@ def whole_floor(field: DistanceField, keeping: Keeping, width_m: float, overlap_
     radius_m, inside = keeping.radius_m, keeping.start_xy_m
     cell_m = pass_cell_m(width_m, radius_m)
     floor = Floor.of_field(field, field.bounds_m, radius_m, cell_m, inside, exact=True)
-    inner = path_floor(field, keeping, width_m, floor)
+    floor = floor.alone(field, cell_m, inside)
     rim = sweepable(floor, width_m) & ~floor.reachable
-    must = floor.reachable & _within_reach(floor, inner, 0.5 * width_m - floor.cell_m)
-    return Sought(floor, inner, must, rim, width_m - overlap_m)
+    laid = []
+    for cells in CELLS:
+        inner = path_floor(field, keeping, width_m, floor, cells)
+        must = floor.reachable & _within_reach(floor, inner, 0.5 * width_m - floor.cell_m)
+        laid.append(Sought(floor, inner, must, rim, width_m - overlap_m))
+        if not (floor.reachable & ~must).any():
+            break
+    return max(laid, key=lambda sought: int(np.count_nonzero(sought.must)))
 
 
 def _within_reach(floor: Floor, inner: Floor, reach_m: float) -> BoolArray:

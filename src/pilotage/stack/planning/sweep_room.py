@@ -9,14 +9,14 @@ import numpy as np
 import scipy
 
 from pilotage.core.types import BoolArray
+from pilotage.kernels.grids.distance import FAR, squared_distance
 from pilotage.kernels.grids.travel_cost import travel_costs
 from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.floor import Floor, cell_side_m
 
-FINEST_M = 0.02
-"""Side of the cells of paths, larger on large floors: passages with less than this to spare may be missed."""
-MOST_CELLS = 1_000_000
-"""Larger floors take coarser cells for paths."""
+CELLS = ((0.02, 1_000_000), (0.015, 4_000_000))
+"""Side of the cells of paths and how many there may be, larger floors take coarser ones; and where those leave
+something out. A passage is found if it leaves the body 1.2 times their side on either side."""
 SHARES = (1.0, 0.8, 0.6, 0.4, 0.2, 0.0)
 """How much of what is kept beyond the body's need is tried, one after the other."""
 NEAR_WALLS = 3.0
@@ -32,7 +32,9 @@ class Keeping:
     start_xy_m: tuple[float, float]
 
 
-def path_floor(field: DistanceField, keeping: Keeping, width_m: float, told: Floor) -> Floor:
+def path_floor(
+    field: DistanceField, keeping: Keeping, width_m: float, told: Floor, cells: tuple[float, int]
+) -> Floor:
     """Where the cells of a sweep's path are: they keep the clearance; where there is no room, what there is.
 
     The least is half a diagonal of a cell more than the body needs, as a line through cells' middles comes
@@ -43,13 +45,18 @@ def path_floor(field: DistanceField, keeping: Keeping, width_m: float, told: Flo
     Parameters
     ----------
     told
-        The cells that are to be swept; some lie nearer to walls than any of a path's.
+        The cells that are to be swept, and where those of a path begin; some lie nearer to walls than any of
+        these.
+    cells
+        Their side, and how many there may be.
     """
-    bounds_m, inside, radius_m, told_m = field.bounds_m, keeping.start_xy_m, keeping.radius_m, told.cell_m
-    cell_m = cell_side_m(bounds_m, min(FINEST_M, told_m), MOST_CELLS)
+    finest_m, most_cells = cells
+    bounds_m, inside, radius_m, told_m = told.bounds_m, keeping.start_xy_m, keeping.radius_m, told.cell_m
+    longest_m = max(bounds_m[2] - bounds_m[0], bounds_m[3] - bounds_m[1])
+    cell_m = max(cell_side_m(bounds_m, min(finest_m, told_m), most_cells), longest_m / (FAR - 2))
     half_m = math.sqrt(0.5) * cell_m
     tight = Floor.of_field(
-        field, bounds_m, radius_m + half_m, cell_m, inside, exact=True, most_cells=MOST_CELLS
+        field, bounds_m, radius_m + half_m, cell_m, inside, exact=True, most_cells=most_cells
     )
     reach_m = 0.5 * width_m - 1.5 * told_m
     beside_m = reach_m - half_m - 1.5 * cell_m
@@ -116,10 +123,8 @@ def _with_paths(taken: BoolArray, joined: BoolArray, opened: BoolArray) -> BoolA
 
 
 def _within(cells: BoolArray, reach: float) -> BoolArray:
-    """Cells that are within reach of such."""
-    if not cells.any():
-        return np.zeros_like(cells)
-    return np.asarray(scipy.ndimage.distance_transform_edt(~cells) <= reach)
+    """Cells that are within reach of such; none of nothing."""
+    return np.asarray(squared_distance(np.ascontiguousarray(cells)) <= reach**2)
 
 
 def _largest(cells: BoolArray) -> BoolArray:
