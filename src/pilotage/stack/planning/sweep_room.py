@@ -15,7 +15,7 @@ from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.floor import Floor, cell_side_m
 
 CELLS = ((0.02, 1_000_000), (0.015, 4_000_000))
-"""Side of the cells of paths and how many there may be, larger floors take coarser ones; and where those leave
+"""Side of the cells of paths and how many there may be, large floors take coarser ones; and where those leave
 something out. A passage is found if it leaves the body 1.2 times their side on either side."""
 SHARES = (1.0, 0.8, 0.6, 0.4, 0.2, 0.0)
 """How much of what is kept beyond the body's need is tried, one after the other."""
