@@ -26,7 +26,7 @@ from pilotage.kernels.patrol.passes import (
     runs_of_change,
     settle,
 )
-from pilotage.kernels.patrol.reshape import is_free, reshape, straightened
+from pilotage.kernels.patrol.reshape import is_free, reshape, straightened, turns_along
 from pilotage.kernels.patrol.swept import mark_swept
 from pilotage.kernels.tours.entries import anneal_entries, entries_cost
 from pilotage.maps.floor import Floor, sweepable
@@ -323,11 +323,11 @@ def recount(old: FloatArray, new: FloatArray, settled: bool, ground: Ground) -> 
     return more
 
 
-def reshaped(path: FloatArray, ground: Ground, tries: int) -> FloatArray:
+def reshaped(path: FloatArray, ground: Ground, tries: int, turn: float = 0.0) -> FloatArray:
     room = np.zeros((3 * len(path), 2))
     room[: len(path)] = path
     draws = np.random.default_rng(3).random((tries, 6))
-    return room[: reshape(room, len(path), draws, (0.05, 0.0005), ground)]
+    return room[: reshape(room, len(path), draws, (0.05, 0.0005), turn, ground)]
 
 
 def test_the_cells_that_a_leg_sweeps_are_those_near_to_it() -> None:
@@ -405,6 +405,31 @@ def test_a_path_is_changed_to_what_it_needs_and_leaves_nothing_out() -> None:
     lengths = [np.hypot(*np.diff(line, axis=0).T).sum() for line in (path, short)]
     # The detour is 10 m of it; the way back sweeps half a metre of each second pair of lines' ends.
     assert lengths[1] < lengths[0] - 12.0
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_changes_cost_what_they_turn(seed: int) -> None:
+    """Without heat its length and what it turns never grow together: changes count it as it is."""
+    rng = np.random.default_rng(seed)
+    corners = np.cumsum(rng.uniform(-0.8, 0.8, (8, 2)), axis=0) % 4.0 + 1.0
+    path = subdivided(corners, WIDTH_M)
+    ground = ground_of(path, np.zeros(SHAPE, np.bool_))
+    room = np.zeros((3 * len(path), 2))
+    room[: len(path)] = path
+
+    def cost(line: FloatArray) -> float:
+        return line_length_m(line) + 0.3 * turns_along(line)
+
+    size, paid, changes = len(path), cost(path), 0
+    for draws in rng.random((4000, 1, 6)):
+        before = room[:size].copy()
+        size = reshape(room, size, draws, (1e-9, 1e-9), 0.3, ground)
+        now = room[:size].copy()
+        changes += not np.array_equal(before, now)
+        assert cost(now) <= paid + 1e-6
+        paid = cost(now)
+    assert changes > 10
+    assert turns_along(now) < 0.5 * turns_along(path)
 
 
 def test_nothing_is_driven_through_a_wall() -> None:

@@ -93,34 +93,75 @@ def near_one(path: FloatArray, size: int, at: int, begin: int, reach: float) -> 
 
 
 @kernel
-def shift(path: FloatArray, k: int, count: int, dx: float, dy: float, bar: float, ground: Ground) -> None:
-    """Vertices ``k`` and after it, so many, sideways; the legs on both sides of them follow."""
-    spot = path[k - 1 : k + count + 1].copy()
-    spot[1 : count + 1, 0] += dx
-    spot[1 : count + 1, 1] += dy
-    old, new = np.empty((count + 1, 4)), np.empty((count + 1, 4))
-    for i in range(count + 1):
-        put_leg(old, i, path[k - 1 + i], path[k + i])
-        put_leg(new, i, spot[i], spot[i + 1])
-    if is_taken(old, new, bar, ground):
-        path[k : k + count] = spot[1 : count + 1]
+def turned(path: FloatArray, size: int, i: int, j: int, k: int) -> float:
+    """By how much a path turns at vertex ``j`` on its way from ``i`` to ``k`` [rad]; 0 past its ends."""
+    if min(i, j, k) < 0 or max(i, j, k) >= size:
+        return 0.0
+    ax, ay = path[j, 0] - path[i, 0], path[j, 1] - path[i, 1]
+    bx, by = path[k, 0] - path[j, 0], path[k, 1] - path[j, 1]
+    return math.atan2(abs(ax * by - ay * bx), ax * bx + ay * by)
 
 
 @kernel
-def leave_out(path: FloatArray, size: int, k: int, bar: float, ground: Ground) -> int:
+def turns_along(path: FloatArray) -> float:
+    """By how much a path (N, 2) turns at all its vertices together [rad]."""
+    total = 0.0
+    for k in range(1, path.shape[0] - 1):
+        total += turned(path, path.shape[0], k - 1, k, k + 1)
+    return total
+
+
+@kernel
+def shift(
+    path: FloatArray,
+    size: int,
+    k: int,
+    count: int,
+    dx: float,
+    dy: float,
+    bar: float,
+    turn: float,
+    ground: Ground,
+) -> None:
+    """Vertices ``k`` and after it, so many, sideways; the legs on both sides of them follow."""
+    first = max(k - 2, 0)
+    at = k - first
+    spot = path[first : min(k + count + 2, size)].copy()
+    before = turns_along(spot)
+    spot[at : at + count, 0] += dx
+    spot[at : at + count, 1] += dy
+    old, new = np.empty((count + 1, 4)), np.empty((count + 1, 4))
+    for i in range(count + 1):
+        put_leg(old, i, path[k - 1 + i], path[k + i])
+        put_leg(new, i, spot[at - 1 + i], spot[at + i])
+    if is_taken(old, new, bar - turn * (turns_along(spot) - before), ground):
+        path[k : k + count] = spot[at : at + count]
+
+
+@kernel
+def leave_out(path: FloatArray, size: int, k: int, bar: float, turn: float, ground: Ground) -> int:
     """Vertex ``k``; how many there are afterwards."""
     old, new = np.empty((2, 4)), np.empty((1, 4))
     put_leg(old, 0, path[k - 1], path[k])
     put_leg(old, 1, path[k], path[k + 1])
     put_leg(new, 0, path[k - 1], path[k + 1])
-    if not is_taken(old, new, bar, ground):
+    more = (
+        turned(path, size, k - 2, k - 1, k + 1)
+        + turned(path, size, k - 1, k + 1, k + 2)
+        - turned(path, size, k - 2, k - 1, k)
+        - turned(path, size, k - 1, k, k + 1)
+        - turned(path, size, k, k + 1, k + 2)
+    )
+    if not is_taken(old, new, bar - turn * more, ground):
         return size
     path[k : size - 1] = path[k + 1 : size].copy()
     return size - 1
 
 
 @kernel
-def put_in(path: FloatArray, size: int, k: int, place: FloatArray, bar: float, ground: Ground) -> int:
+def put_in(
+    path: FloatArray, size: int, k: int, place: FloatArray, bar: float, turn: float, ground: Ground
+) -> int:
     """A vertex after vertex ``k``; how many there are afterwards."""
     if size + 1 >= path.shape[0]:
         return size
@@ -128,7 +169,13 @@ def put_in(path: FloatArray, size: int, k: int, place: FloatArray, bar: float, g
     put_leg(old, 0, path[k], path[k + 1])
     put_leg(new, 0, path[k], place)
     put_leg(new, 1, place, path[k + 1])
-    if not is_taken(old, new, bar, ground):
+    first, last = max(k - 1, 0), min(k + 3, size)
+    spot = np.empty((last - first + 1, 2))
+    spot[: k + 1 - first] = path[first : k + 1]
+    spot[k + 1 - first] = place
+    spot[k + 2 - first :] = path[k + 1 : last]
+    more = turns_along(spot) - turns_along(path[first:last])
+    if not is_taken(old, new, bar - turn * more, ground):
         return size
     path[k + 2 : size + 1] = path[k + 1 : size].copy()
     path[k + 1] = place
@@ -136,25 +183,45 @@ def put_in(path: FloatArray, size: int, k: int, place: FloatArray, bar: float, g
 
 
 @kernel
-def turn_around(path: FloatArray, i: int, j: int, bar: float, ground: Ground) -> None:
+def turn_around(path: FloatArray, size: int, i: int, j: int, bar: float, turn: float, ground: Ground) -> None:
     """What lies between legs ``i`` and ``j``, the later one."""
     old, new = np.empty((2, 4)), np.empty((2, 4))
     put_leg(old, 0, path[i], path[i + 1])
     put_leg(old, 1, path[j], path[j + 1])
     put_leg(new, 0, path[i], path[j])
     put_leg(new, 1, path[i + 1], path[j + 1])
-    if is_taken(old, new, bar, ground):
+    more = (
+        turned(path, size, i - 1, i, j)
+        + turned(path, size, i, j, j - 1)
+        + turned(path, size, i + 2, i + 1, j + 1)
+        + turned(path, size, i + 1, j + 1, j + 2)
+        - turned(path, size, i - 1, i, i + 1)
+        - turned(path, size, i, i + 1, i + 2)
+        - turned(path, size, j - 1, j, j + 1)
+        - turned(path, size, j, j + 1, j + 2)
+    )
+    if is_taken(old, new, bar - turn * more, ground):
         path[i + 1 : j + 1] = path[i + 1 : j + 1][::-1].copy()
 
 
 @kernel
 def put_elsewhere(
-    path: FloatArray, k: int, count: int, after: int, turned: bool, bar: float, ground: Ground
+    path: FloatArray,
+    size: int,
+    k: int,
+    count: int,
+    after: int,
+    around: bool,
+    bar: float,
+    turn: float,
+    ground: Ground,
 ) -> None:
-    """Vertices ``k`` and after it, so many, between vertex ``after``, none of them, and the next one."""
+    """Vertices ``k`` and after it, so many, between vertex ``after``, none beside them, and the next one."""
     last = k + count - 1
+    begin, end = (last, k) if around else (k, last)
+    second, penult = (last - 1, k + 1) if around else (k + 1, last - 1)
     chain = path[k : last + 1].copy()
-    if turned:
+    if around:
         chain = chain[::-1].copy()
     old, new = np.empty((3, 4)), np.empty((3, 4))
     put_leg(old, 0, path[k - 1], path[k])
@@ -163,7 +230,23 @@ def put_elsewhere(
     put_leg(new, 0, path[k - 1], path[last + 1])
     put_leg(new, 1, path[after], chain[0])
     put_leg(new, 2, chain[count - 1], path[after + 1])
-    if not is_taken(old, new, bar, ground):
+    more = (
+        turned(path, size, k - 2, k - 1, last + 1)
+        + turned(path, size, k - 1, last + 1, last + 2)
+        + turned(path, size, after - 1, after, begin)
+        + turned(path, size, end, after + 1, after + 2)
+        - turned(path, size, k - 2, k - 1, k)
+        - turned(path, size, k - 1, k, k + 1)
+        - turned(path, size, last, last + 1, last + 2)
+        - turned(path, size, after - 1, after, after + 1)
+        - turned(path, size, after, after + 1, after + 2)
+    )
+    if count == 1:
+        more += turned(path, size, after, k, after + 1)
+    else:
+        more += turned(path, size, after, begin, second) + turned(path, size, penult, end, after + 1)
+        more -= turned(path, size, last - 1, last, last + 1)
+    if not is_taken(old, new, bar - turn * more, ground):
         return
     if after > last:
         path[k : after + 1 - count] = path[last + 1 : after + 1].copy()
@@ -175,12 +258,13 @@ def put_elsewhere(
 
 @kernel
 def reshape(
-    path: FloatArray, size: int, draws: FloatArray, heats: tuple[float, float], ground: Ground
+    path: FloatArray, size: int, draws: FloatArray, heats: tuple[float, float], turn: float, ground: Ground
 ) -> int:
     """Change the first ``size`` rows of ``path`` (N, 2) by lot, but for both ends; how many there are then.
 
-    A change is taken by Metropolis' rule, by its length and the price of cells that it leaves or sweeps
-    besides. Legs of the path should be no longer than a width or two: longer ones only get shorter.
+    A change is taken by Metropolis' rule, by its length, by how much it turns, and by the price of cells that
+    it leaves or sweeps besides. Legs of the path should be no longer than a width or two: longer ones only
+    get shorter.
 
     Parameters
     ----------
@@ -188,6 +272,8 @@ def reshape(
         (R, 6) uniform in [0, 1), one row a change that is tried.
     heats
         Temperature at the first and at the last of them, as lengths.
+    turn
+        What turning costs, as a length for each radian.
     ground
         Its counts are of this path; they change with it.
     """
@@ -201,28 +287,28 @@ def reshape(
         k = 1 + int(which * (size - 2))
         if kind < 0.25:
             dx, dy = offset_of(width, a, b)
-            shift(path, k, 1, dx, dy, bar, ground)
+            shift(path, size, k, 1, dx, dy, bar, turn, ground)
         elif kind < 0.35:
-            size = leave_out(path, size, k, bar, ground)
+            size = leave_out(path, size, k, bar, turn, ground)
         elif kind < 0.45:
             dx, dy = offset_of(width, a, b)
             place[0] = path[k, 0] + c * (path[k + 1, 0] - path[k, 0]) + dx
             place[1] = path[k, 1] + c * (path[k + 1, 1] - path[k, 1]) + dy
-            size = put_in(path, size, k, place, bar, ground)
+            size = put_in(path, size, k, place, bar, turn, ground)
         elif kind < 0.6:
             count = 2 + int(a * (LONGEST_CHAIN - 1))
             if k + count < size:
                 dx, dy = offset_of(width, c, b)
-                shift(path, k, count, dx, dy, bar, ground)
+                shift(path, size, k, count, dx, dy, bar, turn, ground)
         elif kind < 0.8:
             j = near_one(path, size - 1, k - 1, int(a * (size - 1)), reach)
             if j >= 0:
-                turn_around(path, min(k - 1, j), max(k - 1, j), bar, ground)
+                turn_around(path, size, min(k - 1, j), max(k - 1, j), bar, turn, ground)
         else:
             count = 1 + int(a * LONGEST_CHAIN)
             after = near_one(path, size - 1, k, int(b * (size - 1)), reach)
-            if k + count < size and after >= 0 and not k - 1 <= after < k + count:
-                put_elsewhere(path, k, count, after, c < 0.5, bar, ground)
+            if k + count < size and after >= 0 and not k - 2 <= after <= k + count:
+                put_elsewhere(path, size, k, count, after, c < 0.5, bar, turn, ground)
     return size
 
 

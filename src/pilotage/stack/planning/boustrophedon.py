@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 from pilotage.core.config import Config
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
+from pilotage.kernels.patrol.reshape import turns_along
 from pilotage.kernels.tours.entries import anneal_entries
 from pilotage.maps.floor import Floor, check_pass_width
 from pilotage.sensors.sensor import Positive
@@ -19,7 +20,7 @@ from pilotage.stack.planning.field_search import path_of_line
 from pilotage.stack.planning.node_search import line_length_m
 from pilotage.stack.planning.plan_status import PlanStatus
 from pilotage.stack.planning.planner import PLANNERS, ConfiguredPlanner, PlanRequest, PlanResult
-from pilotage.stack.planning.sweep_changes import reshaped
+from pilotage.stack.planning.sweep_changes import TURN, reshaped
 from pilotage.stack.planning.sweep_detours import completed, joined
 from pilotage.stack.planning.sweep_floor import Sought, covered, in_cells_of, rest_of, whole_floor
 from pilotage.stack.planning.sweep_lines import sweep_cell_m, sweep_lines
@@ -60,7 +61,7 @@ class BoustrophedonPlanner(ConfiguredPlanner[BoustrophedonConfig]):
     """From the start over the whole reachable floor to the goal, in passes beside one another.
 
     The floor is cut into cells where lines split and join, and cells are put in a good order; of both
-    directions of lines the path is taken that wastes less. Then it is changed at random, as a whole, until it
+    directions of lines the path is taken that costs less. Then it is changed at random, as a whole, until it
     is short for what it sweeps; what is left is swept by detours. Swept is all of the floor where the robot's
     centre can be, by cells of a twelfth of the width or less. Of the rim along walls that only its body
     reaches, corners are left (2 to 5 % of the floor) that would take three times the path that their area
@@ -102,15 +103,16 @@ class BoustrophedonPlanner(ConfiguredPlanner[BoustrophedonConfig]):
         except InputError as error:
             return failure(PlanStatus.NO_PATH, str(error), time.perf_counter() - began)
 
-        def waste_m(path: FloatArray) -> float:
-            """Its length, and what it would take to sweep what it leaves."""
+        def cost_m(path: FloatArray) -> float:
+            """Its length, what it turns, and what it would take to sweep what it leaves."""
             left = within_reach & ~covered(sought.floor, path, width_m)
-            return line_length_m(path) + np.count_nonzero(left) * sought.floor.cell_m**2 / width_m
+            left_m = np.count_nonzero(left) * sought.floor.cell_m**2 / width_m
+            return line_length_m(path) + TURN * width_m * turns_along(path) + left_m
 
-        best = min(paths, key=waste_m)
+        best = min(paths, key=cost_m)
         if within_reach.any():
             changed = reshaped(request.field, sought, best)
-            best = min((completed(sought, path) for path in (changed, best)), key=waste_m)
+            best = min((completed(sought, path) for path in (changed, best)), key=cost_m)
         best = best if line_length_m(best) > 0.0 else best[:1]
         path = path_of_line(best, request, self._config.waypoint_spacing_m)
         took = time.perf_counter() - began

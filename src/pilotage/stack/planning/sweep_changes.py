@@ -23,6 +23,9 @@ ones (36 took twice the time for a millionth less left); a pass is taken to be n
 to either side."""
 WARM, COLD = 0.15, 0.001
 """Temperature of these changes at first and in the end, in widths."""
+TURN = 0.15
+"""What a radian of turning costs, in widths: a robot that stops for every bend takes longer for them than for
+the way. Changes that turn less are shorter in the end as well; from 0.25 on they are not everywhere."""
 STRAIGHT = 0.01
 """Of the width may a line pass beside the vertices that it takes the place of."""
 FLOOR_WORTH, FLOOR_WORTH_END, RIM_WORTH = 3.0, 60.0, 3.0
@@ -61,7 +64,7 @@ def reshaped(field: DistanceField, sought: Sought, path: FloatArray) -> FloatArr
         worth = FLOOR_WORTH * (FLOOR_WORTH_END / FLOOR_WORTH) ** done
         heats = WARM * width_m * (COLD / WARM) ** done, WARM * width_m * (COLD / WARM) ** then
         draws = rng.random((math.ceil(tries / batches), 6))
-        size = reshape(path, size, draws, heats, ground(worth))
+        size = reshape(path, size, draws, heats, TURN * width_m, ground(worth))
     # Legs of a width are for changing them; every bend that is left is a stop and a turn.
     return straightened(path[:size].copy(), STRAIGHT * width_m, ground(FLOOR_WORTH_END))
 
