@@ -97,6 +97,14 @@ class DistanceField:
         )
         return x, y
 
+    def nearest_clear(self, point_xy_m: FloatArray, clearance_m: float) -> FloatArray | None:
+        """(2,) the node nearest to a point that is no nearer to obstacles than so; None where none is."""
+        x_m, y_m = self.axes_m
+        away_m2 = (x_m - point_xy_m[0])[None, :] ** 2 + (y_m - point_xy_m[1])[:, None] ** 2
+        away_m2[self.distance_m < clearance_m] = np.inf
+        row, column = np.unravel_index(int(np.argmin(away_m2)), away_m2.shape)
+        return np.array([x_m[column], y_m[row]]) if np.isfinite(away_m2[row, column]) else None
+
     def at(self, points_xy_m: FloatArray) -> FloatArray:
         """Interpolated distance at points (K, 2); outside the grid 0. Returns (K,)."""
         points = np.ascontiguousarray(points_xy_m, dtype=np.float64).reshape(-1, 2)

@@ -47,12 +47,12 @@ class Wandering:
         self._elsewhere_until_s = -math.inf
         self.plan_at_s = 0.0
 
-    def step(self, readings: Readings) -> Twist:
-        """Choose a command, led by the localizer where it knows what would help."""
+    def step(self, readings: Readings, towards_rad: float | None = None) -> Twist:
+        """Choose a command, led ``towards_rad``, or by the localizer where it knows what would help."""
         if self._wanderer is None:
             return STOP
         led = readings.t_s % (LED_S + FREE_S) < LED_S
-        bearing = self._look() if led else None
+        bearing = (self._look() if towards_rad is None else towards_rad) if led else None
         command = self._wanderer.step(readings, bearing)
         if self._shunting is not None:
             return self._steered(self._shunting, readings.t_s, command)

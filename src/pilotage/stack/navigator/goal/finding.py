@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
-from pilotage.core.types import STOP
+from pilotage.core.angles import wrap_to_pi
+from pilotage.core.types import STOP, FloatArray, Pose2
 from pilotage.sensors.readings import Readings
 from pilotage.stack.interface import Belief, BeliefStatus
 from pilotage.stack.navigator.goal.context import Context
@@ -54,9 +56,14 @@ class Lost:
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """Knows where it is again, and drives on as before while there is no room for a plan."""
+    """Knows where it is again, and drives on as before while there is no room for a plan.
+
+    Who was lost may have left what its map knows, by a door that nobody looked through: no plan begins there,
+    and it makes for the nearest place where one might.
+    """
 
     context: Context
+    towards_m: FloatArray | None = None
 
     def step(self, readings: Readings, belief: Belief) -> Move:
         """Plan from where the robot found itself."""
@@ -64,19 +71,27 @@ class Found:
         context.map_what_is_new(readings, belief)
         context.mode = Mode.WANDER
         if context.t_s < context.wandering.plan_at_s:
-            return Move(self, context.wandering.step(readings))
+            return Move(self, context.wandering.step(readings, self._bearing_rad(pose)))
         result = context.make_plan(pose, context.clearances_m(pose))
         context.journal.count("replans")
         if result.path is None:
             if counts["replans"] >= context.config.max_replans:
                 return fail(context, f"stuck: found itself, but {result.status} ({result.reason})")
             context.wandering.plan_at_s = context.t_s + PLAN_AGAIN_S
-            return Move(self, context.wandering.step(readings))
+            there = context.nearest_room_m(pose) if result.status is PlanStatus.START_BLOCKED else None
+            state = replace(self, towards_m=there)
+            return Move(state, context.wandering.step(readings, state._bearing_rad(pose)))
         context.trail = []
         if context.reactive is not None:
             context.reactive.reset()
         context.take_plan("found", f"the robot knows where it is, ({pose.x_m:.2f}, {pose.y_m:.2f})")
         return Move(Following(context), STOP)
+
+    def _bearing_rad(self, pose: Pose2) -> float | None:
+        if self.towards_m is None:
+            return None
+        x, y = self.towards_m - (pose.x_m, pose.y_m)
+        return wrap_to_pi(math.atan2(y, x) - pose.theta_rad)
 
 
 def lose(context: Context, state: State) -> State:
