@@ -186,6 +186,24 @@ class TestWatching:
         assert trace["localized"][after].all()
         assert off[after].max() < 0.1
 
+    def test_a_small_disc_is_found_by_the_next_scan(self) -> None:
+        """It may turn by 1.3 rad in a silent step: silent between two scans it was blind, and lost from then
+        on for 57 of 60 s, two millimetres from where it was."""
+        more = (
+            "world.obstacles=[]",
+            "stack.localizer={name: particle-filter}",
+            "robot.footprint={radius_m: 0.05}",
+            "robot.motion={name: wheel-drive, wheel_radius_m: 0.02, wheel_separation_m: 0.075, "
+            "max_wheel_speed_rad_s: 25}",
+            "robot.sensors.lidar.rate_hz=5",
+            "robot.faults=[{name: drop, share: 0.05, sensor: odometry}]",
+            "run.time_limit_s=60",
+        )
+        trace = run_loop(build(load_mission("museum-1", more, 0))).finished.robots[0].trace
+        off = np.hypot(trace["est_x_m"] - trace["true_x_m"], trace["est_y_m"] - trace["true_y_m"])
+        assert trace["localized"].mean() > 0.9
+        assert off[trace["t_s"] > 5.0].max() < 0.1
+
     def test_what_commands_do_not_log_begins_anew_where_landmarks_found_the_robot(self) -> None:
         """It was lost for half of twenty seconds without odometry, and three metres off at their end."""
         more = (

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -21,6 +23,7 @@ from pilotage.kernels.slam.edges import (
     edge_jacobian,
     robust,
 )
+from pilotage.kernels.slam.frames import composed
 from pilotage.kernels.slam.ordering import adjacency, minimum_degree
 from pilotage.models.pose_graph import PoseGraph
 from pilotage.models.pose_graph_covariance import covariances, relative_jacobians
@@ -228,6 +231,18 @@ def test_covariances_are_those_of_the_dense_inverse() -> None:
     a, b = np.array([0, 1, 3, 2]), np.array([2, 3, 0, 4])
     expected = found.relative(chosen[a], chosen[b])
     np.testing.assert_allclose(joint.relative(a, b), expected, rtol=1e-9, atol=1e-15)
+
+
+def test_how_poses_follow_what_is_measured() -> None:
+    """As solved anew, to first order."""
+    graph, _ = drive(3, poses=20, closures=6, noise=1e-3)
+    found = optimize(graph, start=Start.GIVEN, tolerance=1e-14).graph
+    changed = 1e-5 * np.random.default_rng(4).standard_normal((graph.i.size, 3))
+    moved = np.array([composed(m, c) for m, c in zip(graph.measurements, changed, strict=True)])
+    again = optimize(replace(found, measurements=moved), start=Start.GIVEN, tolerance=1e-14).graph
+    expected = covariances(found).moved_by(changed, graph.information)
+    np.testing.assert_allclose(again.poses - found.poses, expected, atol=2e-7)
+    assert np.abs(expected).max() > 1e-5
 
 
 def test_relative_jacobians() -> None:

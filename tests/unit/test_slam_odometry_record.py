@@ -115,6 +115,32 @@ def test_what_an_odometry_is_always_off_by_is_righted_where_it_is_no_chance(shar
     assert 0.1 < squares.mean() < 3.0
 
 
+def test_lengths_may_be_off_by_what_wheels_are_until_stretches_say_less() -> None:
+    """A corridor was as long as the odometry's chance alone left it, whatever its wheels."""
+    poses, off = driven(4000, np.random.default_rng(1)), np.array([0.04, 0.0, 0.0])
+    record = recorded(poses, off, np.array([0.002, 0.0, 0.001]), 2)
+    stds = [record.told(np.arange(0, k, 5), poses[:k]).scale_std for k in (6, 600, 3900)]
+    assert stds[0] == pytest.approx(0.03)
+    assert stds[0] > 3.0 * stds[1] > 3.0 * stds[2]
+    assert stds[2] < 0.003
+
+
+def test_who_turns_on_the_spot_learns_nothing_of_lengths() -> None:
+    """Its stretches are off by nothing along its way: eleven of them made chance look like a scale of 1 %."""
+    rng, poses = np.random.default_rng(7), driven(60, np.random.default_rng(6))
+    for _ in range(2000):
+        poses.append(np.asarray(composed(poses[-1], np.array([0.0002, 0.0, 0.05]))))
+    record, record.poses = OdometryRecord(), [np.zeros(3)]
+    for k, (a, b) in enumerate(pairwise(poses)):
+        step = between(a, b)
+        record.add(step + np.array([0.004 * rng.standard_normal() * (k < 60), 0.0, 0.0]))
+    alone = recorded(poses[:60], np.zeros(3), np.array([0.004, 0.0, 0.0]), 7)
+    least = alone.told(np.arange(0, 60, 5), poses[:60]).edges.information[0, 0, 0]
+    told = record.told(np.arange(0, 60, 5), poses)
+    assert told.edges.information[0, 0, 0] < 3.0 * least
+    assert told.scale_std > 0.005
+
+
 def test_stretches_that_scans_leave_open_do_not_speak_for_the_odometry() -> None:
     """Along a bare wall a scan is found where the odometry led it: it was as sure as to the millimetre."""
     poses = driven(1000, np.random.default_rng(3))

@@ -8,7 +8,7 @@ import numpy as np
 
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray, IntArray
-from pilotage.kernels.slam.block_cholesky import factorize
+from pilotage.kernels.slam.block_cholesky import factorize, solve_lower, solve_upper
 from pilotage.kernels.slam.covariances import column_products, inverse_blocks, inverse_columns, joint_products
 from pilotage.kernels.slam.edges import SQUARE, Doubts, Pattern, normal_equations
 from pilotage.models.pose_graph import PoseGraph
@@ -78,6 +78,33 @@ class PoseCovariances:
         columns = self.plan.column[self._checked(poses)]
         factor = self.plan.column_start, self.plan.rows, self.diagonal, self.below
         return JointCovariance(self.graph.poses[poses], *inverse_columns(*factor, columns))
+
+    def moved_by(self, measured: FloatArray, information: FloatArray) -> FloatArray:
+        """(N, 3) by how much the poses change where the edges measure something else.
+
+        Parameters
+        ----------
+        measured
+            (M, 3) by how much the measurements change, each in its own frame.
+        information
+            (M, 3, 3) of what has changed: of an edge of several measurements that of one of them.
+        """
+        graph, column = self.graph, self.plan.column
+        first, second = graph.poses[graph.i], graph.poses[graph.j]
+        by_first, by_second = relative_jacobians(first, second, graph.measurements[:, 2])
+        pull = np.einsum("mij,mj->mi", information, measured)
+        right = np.zeros((len(graph), 3))
+        np.add.at(right, graph.i, np.einsum("mij,mi->mj", by_first, pull))
+        np.add.at(right, graph.j, np.einsum("mij,mi->mj", by_second, pull))
+        free = column >= 0
+        x = np.empty((len(self.diagonal), 3))
+        x[column[free]] = right[free]
+        factor = self.plan.column_start, self.plan.rows, self.diagonal, self.below
+        solve_lower(*factor, x)
+        solve_upper(*factor, x)
+        out = np.zeros((len(graph), 3))
+        out[free] = x[column[free]]
+        return out
 
     def _checked(self, poses: IntArray) -> IntArray:
         index = np.asarray(poses, dtype=np.int64)

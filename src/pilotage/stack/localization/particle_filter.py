@@ -215,8 +215,11 @@ class ParticleFilterLocalizer:
             self._rounds, self._effective = 0, float(self._poses.shape[0])
             moments = self._unweighted()
         mean, cov = moments
-        self._blind = bool(cov[2, 2] > LINEAR_RAD**2)
-        lost = self._blind or self._check.lost(t_s)
+        wide = bool(cov[2, 2] > LINEAR_RAD**2)
+        if isinstance(scan, LidarScan):
+            # What silence hid since the last scan the next one tells, let in by parts.
+            self._blind = wide
+        lost = wide or self._check.lost(t_s)
         if self._relocalization is not None:
             # Where the last scans fit elsewhere those that fit here do so by chance.
             lost |= self._relocalization.trial is not None or self._relocalization.elsewhere

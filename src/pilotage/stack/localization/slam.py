@@ -87,13 +87,13 @@ class SlamLocalizer:
     def close_loops(self) -> int:
         """Look for loops here and now; how many closed."""
         count = self._slam.close(ended=True)
-        self._place()
+        self._place_anew()
         return count
 
     def refine(self) -> None:
         """Align everything with everything that sees the same: for the end, it takes seconds."""
         self._slam.refine()
-        self._place()
+        self._place_anew()
 
     def _align(self, t_s: float, scan: LidarScan) -> None:
         ranges = echoes(scan.ranges_m, self._scanner)
@@ -116,6 +116,12 @@ class SlamLocalizer:
     def _place(self) -> None:
         """Put the map's scans where the graph has their poses."""
         self.scan_grid.move(placed_all(self._frame, self._slam.keyframe_poses))
+
+    def _place_anew(self) -> None:
+        """Put map and robot there between two steps: who asked for it looks where it is now."""
+        self._place()
+        if self.scan_grid.poses.size:
+            self.belief = self._told()
 
     def _told(self) -> Belief:
         base = composed(composed(composed(self._frame, self._slam.pose), self._unmount), self._moved)

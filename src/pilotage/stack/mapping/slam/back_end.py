@@ -79,9 +79,10 @@ class Solved:
     weights: FloatArray
     objective: float
 
-    def covariances(self) -> PoseCovariances:
-        """How sure the poses are, the first being held."""
-        return covariances(self.edges.graph(self.poses), weights=self.weights)
+    def covariances(self, variance_factor: float = 1.0) -> PoseCovariances:
+        """How sure the poses are, the first being held, with alignments unsure by a factor of variance."""
+        edges = self.edges if variance_factor == 1.0 else self.edges.calibrated(variance_factor)
+        return covariances(edges.graph(self.poses), weights=self.weights)
 
 
 def track_edges(track: LocalTrack, share: float = 1.0) -> Edges:
@@ -105,7 +106,10 @@ def track_edges(track: LocalTrack, share: float = 1.0) -> Edges:
     told = agreeing(replace(aligned, information=held), track.odometry.edges, ODOMETRY_PROBABILITY)
     if share == 1.0:
         told = told.scaled(_needed(track.odometry, relative, hessian, surely).astype(np.float64))
-    return fused(aligned.scaled(share), told.scaled(np.where(track.odometry.alone, 1.0 - share, 1.0)))
+    alone = track.odometry.alone
+    told = told.scaled(np.where(alone, 1.0 - share, 1.0))
+    both = fused(aligned.scaled(share), told)
+    return replace(both, odometry=np.where(alone[:, None, None], both.information, told.information))
 
 
 def _needed(told: ToldByOdometry, relative: FloatArray, hessian: FloatArray, surely: FloatArray) -> BoolArray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -11,7 +12,7 @@ from pilotage.core.angles import wrap_array_to_pi
 from pilotage.core.types import BoolArray, FloatArray, IntArray
 from pilotage.kernels.slam.frames import between, composed
 from pilotage.kernels.slam.placing import distance
-from pilotage.kernels.slam.wheels import Wheels, righted, unknown_wheels
+from pilotage.kernels.slam.wheels import SCALE_STD, Wheels, righted, unknown_wheels
 from pilotage.stack.mapping.slam.uncertainty import Edges, relative_poses
 
 STRETCH_M, STRETCHES = 1.0, 200
@@ -20,6 +21,9 @@ over them errors of the alignments, which do not add up, are small."""
 JUDGED_ANEW = 100
 """After so many scans it is judged anew."""
 STANDING_VAR = np.array([0.002, 0.002, 0.001]) ** 2
+DRIVEN = 0.5
+"""Share of a stretch that is driven, not turned, from which on it tells of lengths: who turns on the spot is
+off by next to nothing along its way, and would make all others look sure."""
 EXPECTED_STD, EXPECTED = 0.05, 2.0
 """What it may be expected to be off by, a metre or half a radian, and how many stretches that counts as."""
 HEADING_SHARE = 0.1
@@ -40,19 +44,23 @@ class ToldByOdometry:
         Between consecutive keyframes; they tell nothing where scans fitted nowhere that should have.
     alone
         (M,) where the track hangs by it already, and its own edge says the same.
+    scale_std
+        What all its lengths may be off by together, a share of them.
     """
 
     edges: Edges
     alone: BoolArray
+    scale_std: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class _Judgement:
-    """After so many scans: variances (3,) a metre of path, and what is always off."""
+    """After so many scans: variances (3,) a metre of path, what is always off, and its lengths' std."""
 
     scans: int
     rates: FloatArray
     wheels: Wheels
+    scale_std: float
 
 
 class OdometryRecord:
@@ -105,7 +113,8 @@ class OdometryRecord:
         motions = np.array([righted(judgement.wheels, motion) for motion in moved]).reshape(-1, 3)
         information = np.where(lost[:, None, None], 0.0, np.eye(3) / variances[:, None])
         first = np.arange(len(motions))
-        return ToldByOdometry(Edges(first, first + 1, motions, information, np.zeros_like(lost)), alone)
+        edges = Edges(first, first + 1, motions, information, np.zeros_like(lost))
+        return ToldByOdometry(edges, alone, judgement.scale_std)
 
     def _judged(self, track: list[FloatArray]) -> _Judgement:
         """How far it is to be believed, judged anew now and then."""
@@ -123,15 +132,17 @@ class OdometryRecord:
         moved = np.array([one[0] for one in stretches]).reshape(-1, 3)
         off = np.array([one[1] for one in stretches]).reshape(-1, 3)
         root = np.sqrt([one[2] for one in stretches])
-        held = np.array([one[3] for one in stretches], np.bool_)
+        drove = np.hypot(moved[:, 0], moved[:, 1]) > DRIVEN * root**2
+        held = np.array([one[3] for one in stretches], np.bool_) & drove
         along = _always(moved[held, :1] / root[held, None], off[held, 0] / root[held])
         turned = _always(moved[:, [0, 2]] / root[:, None], off[:, 2] / root)
         wheels = unknown_wheels()._replace(off=np.concatenate([along, turned]))
         left = np.array([o + m - righted(wheels, m) for m, o in zip(moved, off, strict=True)]).reshape(-1, 3)
         squares = (left / root[:, None]) ** 2
-        place = _joined(0.5 * squares[held, :2].sum(axis=1), EXPECTED_STD**2)
+        place = max(_joined(squares[held, axis], EXPECTED_STD**2) for axis in (0, 1))
         heading = _joined(squares[:, 2], 4.0 * EXPECTED_STD**2)
-        return _Judgement(len(track), np.array([place, place, heading]), wheels)
+        scale_std = _left(moved[held, 0] / root[held], off[held, 0] / root[held], place, float(along[0]))
+        return _Judgement(len(track), np.array([place, place, heading]), wheels, scale_std)
 
     def _stretches(self, track: list[FloatArray]) -> list[tuple[FloatArray, FloatArray, float, bool]]:
         """Of the last stretches: motion (3,) it told, what was found beside it, path, and whether held."""
@@ -160,6 +171,16 @@ def _always(told: FloatArray, off: FloatArray) -> FloatArray:
     variance = ((off - told @ shares) ** 2).sum() / (count - number)
     stds = np.abs(shares) / np.sqrt(np.maximum(variance * np.diag(np.linalg.inv(normal)), 1e-18))
     return np.asarray(shares * np.clip((stds - CHANCE_STDS) / (SURE_STDS - CHANCE_STDS), 0.0, 1.0))
+
+
+def _left(told: FloatArray, off: FloatArray, variance: float, taken: float) -> float:
+    """Standard deviation of what lengths told (S,) may still be off by, once a share of them is ``taken``.
+
+    Wheels may be off by SCALE_STD until stretches say more; that what they say was not taken may be wrong.
+    """
+    information = float(told @ told) / variance + SCALE_STD**-2
+    share = float(told @ off) / variance / information
+    return math.sqrt((share - taken) ** 2 + 1.0 / information)
 
 
 def _joined(squares: FloatArray, expected: float) -> float:

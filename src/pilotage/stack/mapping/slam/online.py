@@ -15,7 +15,7 @@ from pilotage.stack.mapping.slam.config import SlamConfig
 from pilotage.stack.mapping.slam.scan_covariances import SHARED_EDGES
 from pilotage.stack.mapping.slam.submaps import TURN_AS_PATH_M
 from pilotage.stack.mapping.slam.tracker import LocalTrack, Tracker
-from pilotage.stack.mapping.slam.uncertainty import errors_of
+from pilotage.stack.mapping.slam.uncertainty import Edges, errors_of
 
 WINDOWS_M = (1.0, 2.0, 4.0)
 """Half a search window's side at most, round by round, each time."""
@@ -48,6 +48,7 @@ class OnlineSlam:
         self._path_m, self._healed, self._led = 0.0, 0, False
         self.keyframe_poses = np.zeros((0, 3))
         self.covariance = np.zeros((3, 3))
+        self._by_scale, self._scale_std = np.zeros(3), 0.0
         self.accepted = 0
 
     @property
@@ -58,17 +59,11 @@ class OnlineSlam:
 
     @property
     def pose_covariance(self) -> FloatArray:
-        """(3, 3) of the last scan's pose.
-
-        The graph's covariances are those of scans with residuals as in an office of many things; a scanner
-        whose scans fit better is the surer for it, and what the closed loops were off by says more the more
-        they are: the estimated variance factor of adjustment (Koch 1999, sect. 3.2.4), the residuals of the
-        scans being its prior.
-        """
-        own = carried_covariance(self.covariance, self.keyframe_poses[-1], self.pose)
-        prior = min((self._tracker.rms_m / USUAL_RMS_M) ** 2, 1.0)
-        factor = (PRIOR_LOOPS * prior + self._misfit) / (PRIOR_LOOPS + self._loops)
-        return max(factor, LEAST_FACTOR) * own + prior * SCAN_COV
+        """(3, 3) of the last scan's pose."""
+        here, pose = self.keyframe_poses[-1], self.pose
+        by_scale = self._scale_std * lever(here, pose) @ self._by_scale
+        own = carried_covariance(self.covariance, here, pose) + np.outer(by_scale, by_scale)
+        return own + self._fit() * SCAN_COV
 
     @property
     def lost(self) -> bool:
@@ -140,7 +135,9 @@ class OnlineSlam:
         """
         if not (self._led and self._config.use_odometry) or len(track.keyframes) < 2:
             return track
-        return replace(track, odometry=self._tracker.by_odometry(len(track.keyframes)))
+        odometry = self._tracker.by_odometry(len(track.keyframes))
+        self._scale_std = odometry.scale_std
+        return replace(track, odometry=odometry)
 
     def _take(self, state: Solved) -> None:
         """Put the keyframes where the graph has them; note what its edges are off by, a loop's in all."""
@@ -149,8 +146,24 @@ class OnlineSlam:
         self._misfit = float((state.weights * squares).sum()) / 3.0
         self._loops = int(state.edges.closes.sum())
         self.keyframe_poses = state.poses.copy()
-        last = np.array([len(state.poses) - 1])
-        self.covariance = SHARED_EDGES * state.covariances().marginals(last)[0]
+        known = state.covariances(self._variance_factor())
+        self.covariance = known.marginals(np.array([len(state.poses) - 1]))[0]
+        self._by_scale = known.moved_by(_lengths(state.edges), state.edges.by_odometry)[-1]
+
+    def _fit(self) -> float:
+        """Squares of the scans' residuals over those in an office of many things, 1 at most."""
+        return min((self._tracker.rms_m / USUAL_RMS_M) ** 2, 1.0)
+
+    def _variance_factor(self) -> float:
+        """What the variances of alignments are multiplied by.
+
+        They are those of scans with residuals as in an office; a scanner whose scans fit better is the surer
+        for it, and what the closed loops were off by says more the more they are: the estimated variance
+        factor of adjustment (Koch 1999, sect. 3.2.4), the residuals of the scans being its prior. Of what an
+        odometry tells neither of them says anything: along a corridor loops are off by nothing.
+        """
+        factor = (PRIOR_LOOPS * self._fit() + self._misfit) / (PRIOR_LOOPS + self._loops)
+        return SHARED_EDGES * max(factor, LEAST_FACTOR)
 
     def _extend(self) -> None:
         """Hang the new keyframe on the one before."""
@@ -159,14 +172,28 @@ class OnlineSlam:
         here = self.keyframe_poses[-1]
         pose = composed(here, moved)
         self._path_m += float(np.hypot(moved[0], moved[1])) + TURN_AS_PATH_M * abs(float(moved[2]))
-        own = SHARED_EDGES * np.linalg.inv(edge.information[0])
+        own = np.linalg.inv(edge.calibrated(self._variance_factor()).information[0])
         turn = turns(pose[2])
+        longer = own @ edge.by_odometry[0] @ _lengths(edge)[0]
+        self._by_scale = lever(here, pose) @ self._by_scale + turn @ longer
         self.covariance = carried_covariance(self.covariance, here, pose) + turn @ own @ turn.T
         self.keyframe_poses = np.concatenate([self.keyframe_poses, pose[None]])
 
 
+def lever(pose: FloatArray, to: FloatArray) -> FloatArray:
+    """(3, 3) by how much a pose in the map moves with another on which it hangs rigidly."""
+    out = np.eye(3)
+    out[0, 2], out[1, 2] = -(to[1] - pose[1]), to[0] - pose[0]
+    return out
+
+
 def carried_covariance(covariance: FloatArray, pose: FloatArray, to: FloatArray) -> FloatArray:
     """Covariance (3, 3) of a pose in the map, seen at another that hangs on it rigidly."""
-    lever = np.eye(3)
-    lever[0, 2], lever[1, 2] = -(to[1] - pose[1]), to[0] - pose[0]
-    return np.asarray(lever @ covariance @ lever.T)
+    carry = lever(pose, to)
+    return np.asarray(carry @ covariance @ carry.T)
+
+
+def _lengths(edges: Edges) -> FloatArray:
+    """(M, 3) by how much longer edges are for a share of their lengths, in the frame of the second pose."""
+    along = edges.relative * [1.0, 1.0, 0.0]
+    return np.asarray(np.einsum("mij,mj->mi", turns(-edges.relative[:, 2]), along))

@@ -19,13 +19,21 @@ LEAST_INFORMATION = np.diag([1.0, 1.0, 1.0])
 
 @dataclass(frozen=True, slots=True)
 class Edges:
-    """Relative measurements as in ``PoseGraph``, and which of them close a loop."""
+    """Relative measurements as in ``PoseGraph``, and which of them close a loop.
+
+    Attributes
+    ----------
+    odometry
+        (M, 3, 3) what of the information an odometry tells; None: nothing. How unsure that is was measured,
+        where alignments are as unsure as their residuals, and loops, show in the end (``calibrated``).
+    """
 
     i: IntArray
     j: IntArray
     relative: FloatArray
     information: FloatArray
     closes: BoolArray
+    odometry: FloatArray | None = None
 
     def __len__(self) -> int:
         return int(self.i.size)
@@ -38,11 +46,23 @@ class Edges:
             np.concatenate([self.relative, other.relative]),
             np.concatenate([self.information, other.information]),
             np.concatenate([self.closes, other.closes]),
+            np.concatenate([self.by_odometry, other.by_odometry]),
         )
+
+    @property
+    def by_odometry(self) -> FloatArray:
+        """``odometry``, zero where it tells nothing."""
+        return np.zeros_like(self.information) if self.odometry is None else self.odometry
 
     def scaled(self, factor: float | FloatArray) -> Edges:
         """Return them with all information multiplied, by one factor or by one each (M,)."""
-        return replace(self, information=self.information * np.reshape(factor, (-1, 1, 1)))
+        each = np.reshape(factor, (-1, 1, 1))
+        return replace(self, information=self.information * each, odometry=self.by_odometry * each)
+
+    def calibrated(self, variance_factor: float) -> Edges:
+        """Return them with alignments as unsure as this factor of their variances says."""
+        told = self.by_odometry
+        return replace(self, information=(self.information - told) / variance_factor + told)
 
     def chosen(self, which: BoolArray) -> Edges:
         """Return some of them."""
@@ -52,6 +72,7 @@ class Edges:
             self.relative[which],
             self.information[which],
             self.closes[which],
+            self.by_odometry[which],
         )
 
     def graph(self, poses: FloatArray) -> PoseGraph:
