@@ -73,18 +73,14 @@ class Motion:
         self.shut_m = max(self.body_m, 2.0 * senses.radius_m + senses.config.gap_m + ROUNDED_M)
         self.wall_m = clearance_m + ROUNDED_M
         config, period_s, speed = senses.config, senses.period_s, motion.top_speed_m_s
-        braking = min(motion.braking_m_s2, speed / senses.dt_s)
         turn_rate = motion.top_turn_rate_rad_s
         turning = min(motion.turn_acceleration_rad_s2, turn_rate / senses.dt_s)
-        self._limits = np.array([speed, braking, braking, turn_rate, turning, period_s])
         self._safety = np.array(
             [period_s + LATENCY_S, senses.radius_m, config.margin_m, config.gap_m, PEOPLE_M_S]
         )
-        window = config.window
-        costs = window.heading_s_per_rad, window.near_cost_s, window.soft_m
-        reacts_s, keep_m = period_s + LATENCY_S, senses.radius_m + config.margin_m
-        self._approach = Approach(speed, braking, window.horizon_s, reacts_s, keep_m)
-        self._window = window.horizon_s, *costs, window.speeds, window.turns, self._approach.slow_m_s
+        braking = senses.brakes.sure_m_s2
+        self._limits = np.array([speed, braking, braking, turn_rate, turning, period_s])
+        self._reckon_with(braking)
         self._room: tuple[FloatArray, Pose2, tuple[float, float]] | None = None
         self._still, self._meets = StillWatch(), Onward(period_s + LATENCY_S, braking)
         self._onward = self._hidden = NO_POINTS
@@ -94,8 +90,22 @@ class Motion:
         self.command, self.to_go_s = STOP, math.nan
         self.blocked = self.taken = False
 
+    def _reckon_with(self, braking_m_s2: float) -> None:
+        """Brakes that have proved to be so good.
+
+        It goes on to ask for the speeds that its data sheet promises: what comes of them is what proves it.
+        """
+        self._limits[2] = braking_m_s2
+        window, (reacts_s, radius_m, margin_m, *_) = self._senses.config.window, self._safety.tolist()
+        costs = window.heading_s_per_rad, window.near_cost_s, window.soft_m
+        top_m_s, keep_m = self._senses.speed_m_s, radius_m + margin_m
+        self._approach = Approach(top_m_s, braking_m_s2, window.horizon_s, reacts_s, keep_m)
+        self._window = window.horizon_s, *costs, window.speeds, window.turns, self._approach.slow_m_s
+
     def watch(self, *, lost: bool) -> None:
         """Look who stands, in a scan, who comes as no mate would, and where mates are that are hidden."""
+        if self._senses.brakes.sure_m_s2 != self._limits[2]:
+            self._reckon_with(self._senses.brakes.sure_m_s2)
         beside = self._beside()
         self._onward = self._meets.step(self._senses, beside)
         self.standing = self._still.step(self._senses.t_s, self._mute(beside), self._senses.fell_silent())
