@@ -366,9 +366,7 @@ def test_a_bag_that_shrinks_while_it_is_walked_is_read_as_a_cut_one(form: str, t
     assert "cut short" in found.damage
 
 
-def test_a_database_whose_rows_never_end_is_given_up(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_database_whose_rows_never_end_is_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """By its view at once, however large it is; else after more steps than its size can need."""
     (tmp_path / "a.db3").write_bytes(endless_rows())
     with pytest.raises(InputError, match="not all of it is tables"):

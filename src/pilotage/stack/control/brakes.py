@@ -10,6 +10,7 @@ from pilotage.core.types import Twist
 from pilotage.kernels.control.motion_limits import Drive
 from pilotage.models.odometry import increment_variances
 from pilotage.sensors.readings import OdometryIncrement, Readings
+from pilotage.sensors.wheel_odometry import WheelOdometryConfig
 from pilotage.stack.control.answer import DELAYS, SHARES, Answer
 from pilotage.stack.control.own_motion import odometry_of_every_step
 from pilotage.stack.knowledge import RobotKnowledge
@@ -20,6 +21,8 @@ BETWEEN = 0.1
 """Two shares that are below 1."""
 MISSED_STEPS = 1.5
 """It is told of every step, or begins anew."""
+NOISE_STDS = 2.0
+"""Who brakes by less than so many deviations of an odometry's speed in a step is told too little by it."""
 SAME = 0.01
 """Of top speed, by which commands differ that are one and the same here."""
 
@@ -39,6 +42,9 @@ class Brakes:
     sure_m_s2
         What it can be relied on for: as a share between two hypotheses may be told as the higher one, the
         next lower one than what seems likely; as long as that is what its data sheet says, that.
+    knows_its_speed_better
+        Whether ``rates_m_s`` are nearer to the truth than the odometry of a step: it takes several steps to
+        brake by what that may be off.
     """
 
     def __init__(self, robot: RobotKnowledge) -> None:
@@ -50,6 +56,9 @@ class Brakes:
         self._drive = Drive(top_m_s, top_m_s, most, most, motion.top_lateral_m_s, most)
         self._odometry = odometry_of_every_step(robot) if most * dt_s < top_m_s else None
         self._answer, self._t_s = _answer(), 0.0
+        self.knows_its_speed_better = self._odometry is not None and most * dt_s < NOISE_STDS * _speed_std(
+            top_m_s, dt_s, self._odometry[1]
+        )
         self._delay_s, self._dt_s = motion.delay_s, dt_s
         self._settles_s = top_m_s / (WEAKER[-1] * most) + DELAYS[-1] * motion.delay_s
         self._told, self._told_s, self._same_m_s = (0.0, 0.0), 0.0, SAME * top_m_s
@@ -91,6 +100,11 @@ class Brakes:
         ahead_m_s, lateral_m_s = self._told
         if math.hypot(command.v_m_s - ahead_m_s, command.lateral_m_s - lateral_m_s) > self._same_m_s:
             self._told, self._told_s = (command.v_m_s, command.lateral_m_s), self._t_s
+
+
+def _speed_std(v_m_s: float, dt_s: float, sheet: WheelOdometryConfig) -> float:
+    """Of a speed that an odometry tells of one step (m/s)."""
+    return math.sqrt(increment_variances(v_m_s * dt_s, 0.0, *sheet.densities)[0]) / dt_s
 
 
 def _answer() -> Answer:

@@ -82,7 +82,7 @@ class Context(Paths):
         if self.battery is not None:
             self.battery.spend(driven_m)
         if self.fresh:
-            self.motion.watch()
+            self.motion.watch(lost=lost)
             if not lost:
                 self.look_who_shuts_paths()
 

@@ -12,6 +12,7 @@ from pilotage.kernels.geometry.field import Field
 from pilotage.models.motion.motion import MotionConfig
 from pilotage.stack.navigator.patrol.approach import Approach
 from pilotage.stack.navigator.patrol.gate import NO_GATE, gate_at
+from pilotage.stack.navigator.patrol.hidden import HiddenMates
 from pilotage.stack.navigator.patrol.onward import Onward
 from pilotage.stack.navigator.patrol.passage import CLAIM_M
 from pilotage.stack.navigator.patrol.senses import (
@@ -72,31 +73,48 @@ class Motion:
         self.shut_m = max(self.body_m, 2.0 * senses.radius_m + senses.config.gap_m + ROUNDED_M)
         self.wall_m = clearance_m + ROUNDED_M
         config, period_s, speed = senses.config, senses.period_s, motion.top_speed_m_s
-        braking = min(motion.braking_m_s2, speed / senses.dt_s)
         turn_rate = motion.top_turn_rate_rad_s
         turning = min(motion.turn_acceleration_rad_s2, turn_rate / senses.dt_s)
-        self._limits = np.array([speed, braking, braking, turn_rate, turning, period_s])
         self._safety = np.array(
             [period_s + LATENCY_S, senses.radius_m, config.margin_m, config.gap_m, PEOPLE_M_S]
         )
-        window = config.window
-        costs = window.heading_s_per_rad, window.near_cost_s, window.soft_m
-        reacts_s, keep_m = period_s + LATENCY_S, senses.radius_m + config.margin_m
-        self._approach = Approach(speed, braking, window.horizon_s, reacts_s, keep_m)
-        self._window = window.horizon_s, *costs, window.speeds, window.turns, self._approach.slow_m_s
+        braking = senses.brakes.sure_m_s2
+        self._limits = np.array([speed, braking, braking, turn_rate, turning, period_s])
+        self._reckon_with(braking)
         self._room: tuple[FloatArray, Pose2, tuple[float, float]] | None = None
         self._still, self._meets = StillWatch(), Onward(period_s + LATENCY_S, braking)
-        self._onward = NO_POINTS
+        self._onward = self._hidden = NO_POINTS
+        self._hidden_mates = HiddenMates(senses, roadmap)
         self._swings_s = period_s + LATENCY_S + turn_rate / turning
         self.standing = NO_POINTS
         self.command, self.to_go_s = STOP, math.nan
         self.blocked = self.taken = False
 
-    def watch(self) -> None:
-        """Look who stands, in a scan, and who comes as no mate would."""
+    def _reckon_with(self, braking_m_s2: float) -> None:
+        """Brakes that have proved to be so good.
+
+        It goes on to ask for the speeds that its data sheet promises: what comes of them is what proves it.
+        """
+        self._limits[2] = braking_m_s2
+        window, (reacts_s, radius_m, margin_m, *_) = self._senses.config.window, self._safety.tolist()
+        costs = window.heading_s_per_rad, window.near_cost_s, window.soft_m
+        top_m_s, keep_m = self._senses.speed_m_s, radius_m + margin_m
+        self._approach = Approach(top_m_s, braking_m_s2, window.horizon_s, reacts_s, keep_m)
+        self._window = window.horizon_s, *costs, window.speeds, window.turns, self._approach.slow_m_s
+
+    def watch(self, *, lost: bool) -> None:
+        """Look who stands, in a scan, who comes as no mate would, and where mates are that are hidden."""
+        if self._senses.brakes.sure_m_s2 != self._limits[2]:
+            self._reckon_with(self._senses.brakes.sure_m_s2)
         beside = self._beside()
         self._onward = self._meets.step(self._senses, beside)
         self.standing = self._still.step(self._senses.t_s, self._mute(beside), self._senses.fell_silent())
+        self._hidden = NO_POINTS if lost else self._hidden_mates.fronts(self._stop_m())
+
+    def _stop_m(self) -> float:
+        """What it needs at most to stop, of what it can be told now."""
+        v_m_s = self._senses.moving_m_s + self._limits[1] * self._limits[5]
+        return float(v_m_s * (self._safety[0] + 0.5 * v_m_s / self._limits[2]))
 
     def _give_way_to_nobody(self) -> FloatArray:
         """(P, 2) returns, base frame, of people and of who comes as they do."""
@@ -230,7 +248,7 @@ class Motion:
             pose.as_array(),
             limits,
             self._safety,
-            (senses.near, senses.strange, self._give_way_to_nobody()),
+            (senses.near, np.concatenate([senses.strange, self._hidden]), self._give_way_to_nobody()),
             field,
             gate,
             senses.field(lost=False),

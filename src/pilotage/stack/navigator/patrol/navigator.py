@@ -9,6 +9,7 @@ from pilotage.core.types import STOP, Twist
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.readings import Readings
+from pilotage.stack.control.brakes import Brakes
 from pilotage.stack.control.last_word import LastWord
 from pilotage.stack.interface import NAVIGATORS, Belief, BeliefStatus, StackStatus
 from pilotage.stack.journal import Journal
@@ -140,7 +141,9 @@ class PatrolNavigator:
             len(context.strange),
             *context.alarm,
         )
-        return command if not self._has_corners or self._corners_allow(command) else STOP
+        command = command if not self._has_corners or self._corners_allow(command) else STOP
+        context.sent(command)
+        return command
 
     def _corners_allow(self, command: Twist) -> bool:
         """Whether no corner swings into anybody: who comes on is soon inside the disc that it drives as."""
@@ -152,11 +155,12 @@ def _check_beams(config: PatrolNavigatorConfig, robot: RobotKnowledge, mate_m: f
     """Refuse a laser that may show a mate of a radius by one beam alone, which may be dust, where both still
     can stop."""
     name, lidar = robot.one_sensor(LidarConfig, "navigator 'patrol'")
-    stops_m = stop_m(robot, max(1.0 / lidar.rate_hz, robot.dt_s))
+    speed_m_s, period_s = robot.motion.top_speed_m_s, max(1.0 / lidar.rate_hz, robot.dt_s)
+    stops_m = stop_m(speed_m_s, Brakes(robot).sure_m_s2, period_s)
     half_rad = math.asin(mate_m / (robot.radius_m + mate_m + 2.0 * stops_m + config.gap_m))
     if lidar.beam_step_rad > half_rad:
         least = math.ceil(lidar.beams * lidar.beam_step_rad / half_rad)
         raise InputError(
             f"robot.sensors.{name}.beams: expected {least} or more, two of which meet a team mate while both "
-            f"can stop from {robot.motion.top_speed_m_s:g} m/s, found {lidar.beams}"
+            f"can stop from {speed_m_s:g} m/s, found {lidar.beams}"
         )

@@ -16,6 +16,7 @@ from pilotage.sensors.lidar import LidarConfig
 from pilotage.sensors.radio import RadioConfig
 from pilotage.sensors.readings import LidarScan, OdometryIncrement, RadioMessages, Readings
 from pilotage.sensors.wheel_odometry import WheelOdometryConfig
+from pilotage.stack.control.brakes import Brakes
 from pilotage.stack.interface import Belief
 from pilotage.stack.journal import Journal
 from pilotage.stack.knowledge import RobotKnowledge
@@ -60,7 +61,9 @@ class Senses:
     t_s, pose, spread_m
         Of this step; how far off it may be.
     twist
-        By the odometry.
+        By the odometry; where that is too rough to brake by, its speed by what it was told as well.
+    brakes
+        As they have proved so far.
     fresh
         Whether this step has a scan.
     near, strange
@@ -108,7 +111,7 @@ class Senses:
         self._mount = np.array([lidar.mount.x_m, lidar.mount.y_m, lidar.mount.theta_rad])
         self._known = chart.wall_field
         self.period_s = max(1.0 / lidar.rate_hz, robot.dt_s)
-        self._near_m = max(NEAR_M, stop_m(robot, self.period_s) + robot.radius_m + config.margin_m)
+        self.brakes = Brakes(robot)
         self.t_s, self.pose, self.spread_m, self.twist = 0.0, start, 0.0, STOP
         self._moved_s = 0.0
         self.fresh = False
@@ -126,6 +129,7 @@ class Senses:
         """One step's readings; returns the distance driven since the last one."""
         self.t_s, self.pose, cov = readings.t_s, belief.pose, belief.cov
         self.spread_m = SIGMAS * math.sqrt(max(cov.item(0, 0), cov.item(1, 1)))
+        self.brakes.take_in(readings)
         driven_m, odometry = 0.0, readings.by_sensor.get(self._odometry)
         if isinstance(odometry, OdometryIncrement):
             driven_m = odometry.distance_m
@@ -133,6 +137,8 @@ class Senses:
             steps = max(1, round((self.t_s - self._moved_s) / self.dt_s))
             self.twist = Twist(driven_m / (steps * self.dt_s), odometry.angle_rad / (steps * self.dt_s))
             self._moved_s = self.t_s
+            if self.brakes.knows_its_speed_better:
+                self.twist = Twist(self.brakes.rates_m_s[0], self.twist.w_rad_s)
         said = None if self._radio is None else readings.by_sensor.get(self._radio)
         if isinstance(said, RadioMessages):
             for message in said.messages:
@@ -144,6 +150,10 @@ class Senses:
         if isinstance(scan, LidarScan):
             self._look_around(scan.ranges_m, SIGMAS * math.sqrt(cov.item(2, 2)), lost=lost)
         return driven_m
+
+    def sent(self, command: Twist) -> None:
+        """What leaves in this step."""
+        self.brakes.sent(command)
 
     def hear(self, sent_s: float, word: TeamWord) -> None:
         """A mate said something."""
@@ -157,12 +167,13 @@ class Senses:
 
     def _look_around(self, ranges_m: FloatArray, spread_rad: float, *, lost: bool) -> None:
         """Who is there, of a scan."""
+        stops_m = stop_m(self.speed_m_s, self.brakes.sure_m_s2, self.period_s)
         self.near, self.strange = disc_returns.scan_returns(
             ranges_m,
             self._directions,
             self._mount,
             self.pose.as_array(),
-            self._near_m,
+            max(NEAR_M, stops_m + self.radius_m + self.config.margin_m),
             self._look_m,
             self.config.tolerance_m + self.spread_m,
             spread_rad,
@@ -289,10 +300,8 @@ class Senses:
         self.journal.say(self.t_s, kind, text)
 
 
-def stop_m(robot: RobotKnowledge, period_s: float) -> float:
-    """What a robot needs to stop from its top speed, told so a period after what it stops for is seen."""
-    speed_m_s = robot.motion.top_speed_m_s
-    braking_m_s2 = min(robot.motion.braking_m_s2, speed_m_s / robot.dt_s)
+def stop_m(speed_m_s: float, braking_m_s2: float, period_s: float) -> float:
+    """What a robot needs to stop, told so a period after what it stops for is seen."""
     return speed_m_s * (period_s + LATENCY_S) + 0.5 * speed_m_s**2 / braking_m_s2
 
 
