@@ -68,7 +68,7 @@ def test_teams_start_on_the_floor_of_their_patrol_and_too_many_are_refused() -> 
     )
     for index in range(16):
         floor.nearest_cell(np.array(_start(mission, index)))
-    with pytest.raises(InputError, match=r"team\.size: expected at most 11, for") as caught:
+    with pytest.raises(InputError, match=r"team\.size: expected at most 10, for") as caught:
         build_source(load_mission("museum-patrol", house, seed=0))
     assert "\n" not in str(caught.value)
 

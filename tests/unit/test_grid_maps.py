@@ -72,17 +72,23 @@ class TestCells:
         assert np.allclose(grid.centres_m(np.array([[1, 0], [1, 1]])), [[-0.5, 0.5], [-0.5, 1.5]])
 
     @given(
-        arrays(np.int8, SHAPES, elements=st.sampled_from([-1, -1, -1, 0, 100])), st.floats(-math.pi, math.pi)
+        arrays(np.int8, SHAPES, elements=st.sampled_from([-1, -1, -1, 0, 100])),
+        st.floats(-math.pi, math.pi),
+        st.integers(1, 3),
     )
-    def test_what_is_known_stays_where_it_is(self, cells: OccupancyArray, yaw: float) -> None:
-        """And what is not is left out but for one cell around it."""
+    def test_what_is_known_stays_where_it_is(self, cells: OccupancyArray, yaw: float, step: int) -> None:
+        """And what is not is left out but for one cell around it, and what whole steps take."""
         grid = OccupancyGrid(np.pad(cells, 2, constant_values=UNKNOWN), 0.5, Pose2(3.0, -7.0, yaw))
-        part = grid.known_part()
+        part = grid.known_part(step)
         known = np.argwhere(grid.cells != UNKNOWN)
         if len(known) == 0:
             assert part is grid
             return
-        assert part.cells.shape == tuple(np.ptp(known, axis=0) + 3)
+        more = np.array(part.cells.shape) - np.ptp(known, axis=0) - 3
+        assert ((more >= 0) & (more < step)).all()
+        steps = grid.places_at(part.points_m(np.array([[part.rows, 0]])))[0] / step
+        below = grid.rows / step - steps[0]
+        assert abs(below - round(below)) + abs(steps[1] - round(steps[1])) < 1e-9
         row, column = part.cells_at(grid.centres_m(known)).T
         assert (part.cells[row, column] == grid.cells[tuple(known.T)]).all()
         assert (part.cells != UNKNOWN).sum() == len(known)

@@ -106,7 +106,8 @@ def test_a_run_on_a_grid(in_a_room: Path) -> None:
     run = read_run(in_a_room)
     assert run.grid is not None
     classes, size_m = cell_classes(run.grid)
-    assert size_m == pytest.approx([10.0, 8.0])
+    # The room and a cell around it, of 10 m x 8 m that are unknown but for it.
+    assert size_m == pytest.approx([6.2, 4.2])
     assert {FREE_CELL, UNKNOWN_CELL, OCCUPIED_CELL} == set(np.unique(classes).tolist())
     # Only the room is shown, not the unknown around it.
     assert known_corners(run.grid) == pytest.approx(np.array([(0, 0), (6, 0), (6, 4), (0, 4)]), abs=1e-9)
@@ -152,7 +153,7 @@ def test_a_floor_of_cells_has_a_floors_page_however_large_it_is(
     run = read_run(large)
     assert run.terrain is None
     assert run.grid is not None
-    assert (run.grid.cells.shape, run.grid.resolution_m) == ((40, 50), 0.2)
+    assert (run.grid.cells.shape, run.grid.resolution_m) == ((21, 31), 0.2)
     assert not len(run.world.segments_m)
     assert 'class="layer-grid"' in checked_page(large, "replay", *DRIVEN)
 

@@ -23,6 +23,9 @@ from pilotage.maps.world_map import WorldMap
 
 MOST_CELLS = 400_000
 """Larger floors take coarser cells: a distance costs a search over all of them."""
+CELLS_M = 0.1, 0.05
+"""Sides of cells where nobody says: the second where none of the first is in the middle of some passage that
+the body fits through."""
 CELLS_A_PASS = 4
 """The least that tell whether a pass went beside another one."""
 FINE_CELLS = 12
@@ -92,7 +95,7 @@ class Floor:
     def of(
         world: WorldMap,
         radius_m: float,
-        cell_m: float = 0.1,
+        cell_m: float | None = None,
         inside_xy_m: tuple[float, float] | None = None,
         *,
         exact: bool = False,
@@ -102,7 +105,7 @@ class Floor:
         Parameters
         ----------
         cell_m
-            Side of a cell, coarser where the map is too large for it.
+            Side of a cell, coarser where the map is too large for it; None: as ``CELLS_M``.
         inside_xy_m
             A place on the floor that is meant; else as of ``meant_piece``. What lies outside of it is none.
         exact
@@ -114,17 +117,26 @@ class Floor:
         InputError
             Where the robot fits nowhere, or not at the place.
         """
-        where = f"map '{world.name}'"
-        return Floor.of_field(
-            world.field, world.bounds_m, radius_m, cell_m, inside_xy_m, where, exact=exact, world=world
-        )
+
+        def laid(cell_m: float) -> Floor:
+            where = f"map '{world.name}'"
+            return Floor.of_field(
+                world.field, world.bounds_m, radius_m, cell_m, inside_xy_m, where, exact=exact, world=world
+            )
+
+        if cell_m is not None:
+            return laid(cell_m)
+        coarse = laid(CELLS_M[0])
+        lost = coarse.middles(coarse.beside_passages)
+        fine = laid(CELLS_M[1]) if len(lost) else coarse
+        return fine if fine.reachable[fine.cells_of(lost)].any() else coarse
 
     @staticmethod
     def of_field(
         field: DistanceField,
         bounds_m: tuple[float, float, float, float],
         radius_m: float,
-        cell_m: float = 0.1,
+        cell_m: float = CELLS_M[0],
         inside_xy_m: tuple[float, float] | None = None,
         where: str = "map",
         *,
@@ -214,6 +226,14 @@ class Floor:
         """xmin, ymin, xmax, ymax of all cells."""
         (xmin, ymin), (rows, columns) = self.origin_xy_m, self.reachable.shape
         return xmin, ymin, xmin + columns * self.cell_m, ymin + rows * self.cell_m
+
+    @property
+    def beside_passages(self) -> BoolArray:
+        """(rows, columns) cells for the centre to which passages may lead that have none in their middle."""
+        fits = self.clearance_m >= self.radius_m
+        pieces, _ = scipy.ndimage.label(self.clearance_m >= self.radius_m - HALF_DIAGONAL * self.cell_m)
+        home = pieces[tuple(np.argwhere(self.reachable)[0])]
+        return np.asarray(fits & ~self.reachable & (pieces == home))
 
     @property
     def apart_fraction(self) -> float:

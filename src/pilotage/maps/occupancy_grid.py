@@ -82,10 +82,10 @@ class OccupancyGrid:
         cells[(blocks >= OCCUPIED_FROM).any(axis=(1, 3))] = OCCUPIED
         return OccupancyGrid(cells, self.resolution_m * step, self.origin)
 
-    def known_part(self) -> OccupancyGrid:
+    def known_part(self, step: int = 1) -> OccupancyGrid:
         """The least of it with all that is known, and one cell of what is not on each side that has it.
 
-        All of it where nothing is known.
+        All of it where nothing is known. It begins a whole number of ``step`` cells from the origin.
         """
         sides = []
         for axis, size in ((1, self.rows), (0, self.columns)):
@@ -94,6 +94,7 @@ class OccupancyGrid:
                 return self
             sides.append((max(int(known[0]) - 1, 0), min(int(known[-1]) + 2, size)))
         (top, bottom), (left, right) = sides
+        bottom, left = bottom + (self.rows - bottom) % step, left - left % step
         if (top, bottom, left, right) == (0, self.rows, 0, self.columns):
             return self
         x_m, y_m = self.points_m(np.array([[bottom, left]]))[0].tolist()

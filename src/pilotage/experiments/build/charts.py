@@ -18,6 +18,7 @@ from pilotage.core.neighbours import hint_beside
 from pilotage.core.types import Pose2
 from pilotage.experiments.values import parse_yaml, read_text
 from pilotage.maps.crater_cache import cached_crater_terrain
+from pilotage.maps.distance_field import SPACING_M
 from pilotage.maps.edge import closed
 from pilotage.maps.elevation_file import HEIGHTS_ALONE, read_elevation
 from pilotage.maps.grid_file import GRID_SUFFIXES, read_grid
@@ -199,8 +200,10 @@ def _sheet(sheet: SheetFile, name: str, markings: MarkingsConfig) -> WorldMap:
 
 
 def _grid(path: Path, resolution_m: float | None = None, origin: Pose2 | None = None) -> WorldMap:
-    # Programs that draw maps leave much of the image grey: cells are for where somebody may be.
-    grid = read_grid(path, resolution_m, origin).known_part()
+    grid = read_grid(path, resolution_m, origin)
+    # Programs that draw maps leave much of the image grey: cells are for where somebody may be. Nodes of the
+    # map's distances lie where they would over all of it.
+    grid = grid.known_part(max(1, round(SPACING_M / grid.resolution_m)))
     return WorldMap(path.stem, bounds_of(grid), grid=grid)
 
 
