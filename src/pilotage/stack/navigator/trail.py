@@ -14,21 +14,35 @@ STEP_M, UNSURE_M = 0.01, 0.005
 
 
 class Trail:
-    """Positions and their standard deviations, a row where something has changed."""
+    """Positions and how unsure they are to the side, a row where something has changed.
+
+    A robot in a corridor may not know how far along it is: what it sweeps there it sweeps all the same. Fails
+    at the ends of lines that end where no wall is, by what it is off along them.
+    """
 
     def __init__(self) -> None:
         self._rows: list[tuple[float, float, float]] = []
+        self._across: FloatArray | None = None
 
     def add(self, belief: Belief) -> None:
         """Where it is now."""
-        here = belief.pose.x_m, belief.pose.y_m, belief.std_m
+        x_m, y_m = belief.pose.x_m, belief.pose.y_m
         if self._rows:
-            x_m, y_m, std_m = self._rows[-1]
-            if math.hypot(here[0] - x_m, here[1] - y_m) < STEP_M and abs(here[2] - std_m) < UNSURE_M:
+            dx_m, dy_m = x_m - self._rows[-1][0], y_m - self._rows[-1][1]
+            moved_m = math.hypot(dx_m, dy_m)
+            if moved_m >= STEP_M:
+                self._across = np.array([-dy_m, dx_m]) / moved_m
+            elif abs(self._std_m(belief) - self._rows[-1][2]) < UNSURE_M:
                 return
-        self._rows.append(here)
+        self._rows.append((x_m, y_m, self._std_m(belief)))
+
+    def _std_m(self, belief: Belief) -> float:
+        """Across the way that it moves; before it moves, in any direction."""
+        if self._across is None:
+            return belief.std_m
+        return math.sqrt(max(float(self._across @ belief.cov[:2, :2] @ self._across), 0.0))
 
     @property
     def rows(self) -> FloatArray:
-        """(N, 3) x, y and their standard deviation [m]."""
+        """(N, 3) x, y and the standard deviation to the side [m]."""
         return np.array(self._rows).reshape(-1, 3)

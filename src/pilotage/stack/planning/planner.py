@@ -88,8 +88,8 @@ class PlanRequest:
         Whether the clearance is kept beside the footprint's outline, driven along the very path; else
         it holds the whole robot: of a polygon, the disc around it. Planners for outlines always take it so.
     trail
-        (N, 3) x, y and their standard deviation [m]: where the robot has been since it first asked, for
-        planners of paths that cover something; None at first.
+        (N, 3) x, y and the standard deviation to the side [m]: where the robot has been since it first asked,
+        for planners of paths that cover something; None at first.
     """
 
     start: Pose2

@@ -119,7 +119,7 @@ def surely_covered(floor: Floor, trail: FloatArray, width_m: float, overlap_m: f
     Parameters
     ----------
     trail
-        (N, 3) x, y and their standard deviation [m].
+        (N, 3) x, y and the standard deviation to the side [m].
     """
     found = np.zeros_like(floor.reachable)
     if not len(trail):  # a sweep that ended before its first pass
