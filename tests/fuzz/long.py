@@ -111,7 +111,7 @@ def keep(case: Path, name: str, words: tuple[str, ...], outcome: Outcome) -> Non
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     for path in case.rglob("*"):
-        if path.is_file() and not path.is_symlink() and path.stat().st_size < 10_000_000:
+        if path.is_file() and not path.is_symlink() and path.stat().st_size < 100_000_000:
             kept = folder / path.relative_to(case)
             kept.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(path, kept)
