@@ -34,6 +34,19 @@ def test_a_start_with_too_little_to_spare_says_how_much_is_asked_for() -> None:
         floor.roomy(0.02, 0.3, (1.0, 0.375))
 
 
+@pytest.mark.parametrize("x_m", [0.0, 0.05, -7.6, 0.03])
+@pytest.mark.parametrize("y_m", [0.0, 0.05, -5.55])
+def test_a_passage_is_found_wherever_the_map_begins(x_m: float, y_m: float) -> None:
+    """A room was lost where no cell of 0.1 m, or no node, lay in the middle of its door of 0.75 m."""
+    cells = np.zeros((61, 122), np.bool_)
+    cells[[0, -1]] = cells[:, [0, 60, -1]] = True
+    cells[20:35, 60] = False
+    grid = OccupancyGrid.of(cells, 0.05, Pose2(x_m, y_m, 0.0))
+    world = WorldMap("rooms", (x_m, y_m, x_m + 6.1, y_m + 3.05), grid=grid)
+    floor = Floor.of(world, 0.35, inside_xy_m=(x_m + 1.5, y_m + 1.5))
+    assert floor.reachable[floor.cell_of(np.array([x_m + 4.5, y_m + 1.5]))]
+
+
 def test_what_nobody_could_come_to_is_not_left_out() -> None:
     """A closed room is no floor behind a narrow passage."""
     floor = Floor.of(walled(8, 5, (4, 0, 4, 5)), 0.3, inside_xy_m=(2.0, 2.5))

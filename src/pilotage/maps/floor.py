@@ -118,17 +118,18 @@ class Floor:
             Where the robot fits nowhere, or not at the place.
         """
 
-        def laid(cell_m: float) -> Floor:
+        def laid(cell_m: float, exact: bool) -> Floor:
             where = f"map '{world.name}'"
             return Floor.of_field(
                 world.field, world.bounds_m, radius_m, cell_m, inside_xy_m, where, exact=exact, world=world
             )
 
         if cell_m is not None:
-            return laid(cell_m)
-        coarse = laid(CELLS_M[0])
+            return laid(cell_m, exact)
+        coarse = laid(CELLS_M[0], exact)
         lost = coarse.middles(coarse.beside_passages)
-        fine = laid(CELLS_M[1]) if len(lost) else coarse
+        # Between nodes on both sides of a passage's middle there is no more room than at them.
+        fine = laid(CELLS_M[1], True) if len(lost) else coarse
         return fine if fine.reachable[fine.cells_of(lost)].any() else coarse
 
     @staticmethod

@@ -31,9 +31,6 @@ FAR_M = 8.0
 CLOSE_M, CLOSE_EVERY_M = 1.5, 0.1
 """What is seen from none of the places to look from is looked at from so near, by places so near together."""
 
-ROOMY_CELLS_M = 0.1, 0.05
-"""Cells of the first size may lie so that none is in the middle of a narrow passage."""
-
 
 class DerivationConfig(Config):
     """How a graph is laid over a floor."""
@@ -159,17 +156,13 @@ def derive_drivable(
     config = config or DerivationConfig()
     floor = Floor.of(world, radius_m, inside_xy_m=inside_xy_m)
     derived = derive_graph(world, floor, config)
-    roomy_m = radius_m + config.room_m
-    for cell_m in ROOMY_CELLS_M:
-        try:
-            roomy = Floor.of(world, roomy_m, cell_m, inside_xy_m)
-            for place in derived.graph.vertices_xy_m:
-                roomy.nearest_cell(place)
-        except InputError:
-            continue
-        return floor, derived
-    roomy = Floor.of(world, roomy_m, ROOMY_CELLS_M[-1], inside_xy_m)
-    return roomy, derive_graph(world, roomy, config)
+    roomy = Floor.of(world, radius_m + config.room_m, inside_xy_m=inside_xy_m)
+    try:
+        for place in derived.graph.vertices_xy_m:
+            roomy.nearest_cell(place)
+    except InputError:
+        return roomy, derive_graph(world, roomy, config)
+    return floor, derived
 
 
 def views(
