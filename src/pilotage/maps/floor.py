@@ -126,7 +126,10 @@ class Floor:
 
         if cell_m is not None:
             return laid(cell_m, exact)
-        coarse = laid(CELLS_M[0], exact)
+        try:
+            coarse = laid(CELLS_M[0], exact)
+        except InputError:  # the place is in such a passage
+            return laid(CELLS_M[1], True)
         lost = coarse.middles(coarse.beside_passages)
         # Between nodes on both sides of a passage's middle there is no more room than at them.
         fine = laid(CELLS_M[1], True) if len(lost) else coarse
