@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from pilotage.core.types import Pose2
 from pilotage.experiments.build.build import build
@@ -29,8 +30,20 @@ def open_house(folder: Path) -> Path:
     return folder / "map.yaml"
 
 
-def test_who_found_itself_where_no_plan_begins_makes_for_where_one_does(tmp_path: Path) -> None:
-    """It drove on at random until it had asked for 30 plans, farther and farther out."""
+NAVIGATORS = {
+    "goal": [],
+    "maneuver": ["planner={name: hybrid-astar}", "controller={name: kanayama}", "smoother=null"],
+    "local": ["local_controller={name: gap-horizon}", "controller=null", "local_planner=null"],
+}
+
+
+@pytest.mark.parametrize("navigator", NAVIGATORS)
+def test_who_found_itself_where_no_plan_begins_makes_for_where_one_does(
+    tmp_path: Path, navigator: str
+) -> None:
+    """Navigator goal drove on at random until it had asked for 30 plans, farther and farther out; maneuver
+    gave up at once, and local without having moved."""
+    parts = NAVIGATORS[navigator]
     sets = [
         f"world.map={open_house(tmp_path)}",
         "world.random_start=null",
@@ -39,7 +52,10 @@ def test_who_found_itself_where_no_plan_begins_makes_for_where_one_does(tmp_path
         "robot.footprint={radius_m: 0.2}",
         "stack.localizer={name: particle-filter}",
         "run.time_limit_s=120",
+        *(f"stack.{part}" for part in parts),
     ]
+    if parts:
+        sets += [f"stack.navigator={{name: {navigator}}}", "stack.reactive=null", "stack.mapper=null"]
     experiment = build(load_mission("museum-lost", sets, seed=3))
     metrics = experiment.task.judge(run_loop(experiment).finished).metrics
     assert metrics["success"], metrics["reason"]

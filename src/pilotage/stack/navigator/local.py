@@ -185,9 +185,8 @@ class LocalNavigator(LocalizingNavigator):
         return self._step_clear.instead_of(command, readings.t_s, leaves_alone)
 
     def _is_lost(self, t_s: float, belief: Belief) -> bool:
-        """Whether it does not know where it is any more; before its first plan the plan waits to know."""
-        knew = self._plan is None or self._plan.is_made
-        lost = knew and belief.status is BeliefStatus.LOST and not self._standing.is_over
+        """Whether it does not know where it is, yet or any more."""
+        lost = belief.status is BeliefStatus.LOST and not self._standing.is_over
         if lost != self._lost:
             what = "does not know where it is" if lost else "knows where it is, goes on"
             self._standing.journal.say(t_s, "lost" if lost else "found", f"the robot {what}")

@@ -49,8 +49,8 @@ class PlanAheadConfig(Config):
     """So near to such a gap it drives up to it: it costs little more to know than to guess."""
     look_around_s: NonNegative = 2.0
     """So long it looks around where it believes to begin inside something: a start is not known to the cm."""
-    lost_s: NonNegative = 20.0
-    """So long it waits to know where it is at all."""
+    most_tries: int = Field(default=30, ge=0)
+    """So often it plans where it found itself and no plan begins, on its way to where one might."""
     stall_s: Positive = 10.0
     stall_progress_m: Positive = 0.5
     most_stalls: int = Field(default=6, ge=0)
@@ -95,6 +95,8 @@ class PlanAhead:
         self.to_go_m = math.inf
         self.failure, self._why, self._found_no_path = "", "", ""
         self._status: PlanStatus | None = None
+        self._tries_left = config.most_tries if initial.status is BeliefStatus.LOST else 0
+        self._room_m: FloatArray | None = None
         journal.result("mapped_circles_m", lambda: own_map.found_circles_m)
         journal.counts["replans"] = 0
         if initial.status is not BeliefStatus.LOST:
@@ -118,27 +120,29 @@ class PlanAhead:
                 self._make(t_s, pose, f"no progress for {self._stall.patience_s:.3g} s")
             elif t_s - self._planned_s >= self._config.every_s and self._is_blocked():
                 self._make(t_s, pose, "a mapped obstacle stands on the plan")
-        return (pose.x_m, pose.y_m) if self._plan.progress is None else self._point_ahead()
-
-    @property
-    def is_made(self) -> bool:
-        """Whether there is a plan, or was one."""
-        return self._plan.progress is not None
+        if self._plan.progress is not None:
+            return self._point_ahead()
+        x_m, y_m = pose.as_array()[:2] if self._room_m is None else self._room_m
+        return float(x_m), float(y_m)
 
     def _begin(self, t_s: float, belief: Belief) -> None:
-        """Make the first plan, once it is known from where; say why there is none."""
+        """Make the first plan, or make for where one begins; say why there is none."""
         config = self._config
-        if belief.status is BeliefStatus.LOST:
-            if t_s >= config.lost_s:
-                self.failure = "the robot does not know where it is; navigator goal wanders until it does"
-            return
         blocked = self._status is PlanStatus.START_BLOCKED
-        if not blocked or t_s - self._planned_s >= config.every_s:
-            self._make(t_s, belief.pose, "plan")
-        if self._plan.progress is None and not (
-            self._status is PlanStatus.START_BLOCKED and t_s < config.look_around_s
-        ):
-            self.failure = f"no plan leads to the goal: {self._why}"
+        if blocked and t_s - self._planned_s < config.every_s:
+            return
+        self._make(t_s, belief.pose, "plan")
+        if self._plan.progress is not None:
+            return
+        if self._status is PlanStatus.START_BLOCKED and t_s < config.look_around_s:
+            return
+        if self._status is PlanStatus.START_BLOCKED and self._tries_left > 0:
+            self._tries_left -= 1
+            self._room_m = self._own_map.told.field.nearest_clear(
+                belief.pose.as_array()[:2], self._plan.clearance_m
+            )
+            return
+        self.failure = f"no plan leads to the goal: {self._why}"
 
     @property
     def mapped_m(self) -> FloatArray:

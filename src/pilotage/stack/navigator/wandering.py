@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
-from pilotage.core.types import STOP, Twist
+from pilotage.core.angles import wrap_to_pi
+from pilotage.core.types import STOP, FloatArray, Pose2, Twist
 from pilotage.sensors.readings import Readings
 from pilotage.stack.control.last_word import LastWord
 from pilotage.stack.control.shunting import Shunting
@@ -47,13 +49,22 @@ class Wandering:
         self._elsewhere_until_s = -math.inf
         self.plan_at_s = 0.0
 
-    def step(self, readings: Readings, towards_rad: float | None = None) -> Twist:
-        """Choose a command, led ``towards_rad``, or by the localizer where it knows what would help."""
+    def step(self, readings: Readings) -> Twist:
+        """Choose a command, led by the localizer where it knows what would help."""
+        return self._led(readings, self._look)
+
+    def make_for(self, there_m: FloatArray | None, pose: Pose2, readings: Readings) -> Twist:
+        """Choose a command, led to a place (2,) where there is one: it knows where it is."""
+        if there_m is None:
+            return self.step(readings)
+        x, y = there_m - (pose.x_m, pose.y_m)
+        return self._led(readings, lambda: wrap_to_pi(math.atan2(y, x) - pose.theta_rad))
+
+    def _led(self, readings: Readings, bearing_rad: Callable[[], float | None]) -> Twist:
         if self._wanderer is None:
             return STOP
         led = readings.t_s % (LED_S + FREE_S) < LED_S
-        bearing = (self._look() if towards_rad is None else towards_rad) if led else None
-        command = self._wanderer.step(readings, bearing)
+        command = self._wanderer.step(readings, bearing_rad() if led else None)
         if self._shunting is not None:
             return self._steered(self._shunting, readings.t_s, command)
         if readings.t_s >= self._elsewhere_until_s:

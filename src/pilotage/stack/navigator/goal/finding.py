@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 
-from pilotage.core.angles import wrap_to_pi
-from pilotage.core.types import STOP, FloatArray, Pose2
+from pilotage.core.types import STOP, FloatArray
 from pilotage.sensors.readings import Readings
 from pilotage.stack.interface import Belief, BeliefStatus
 from pilotage.stack.navigator.goal.context import Context
@@ -71,7 +69,7 @@ class Found:
         context.map_what_is_new(readings, belief)
         context.mode = Mode.WANDER
         if context.t_s < context.wandering.plan_at_s:
-            return Move(self, context.wandering.step(readings, self._bearing_rad(pose)))
+            return Move(self, context.wandering.make_for(self.towards_m, pose, readings))
         result = context.make_plan(pose, context.clearances_m(pose))
         context.journal.count("replans")
         if result.path is None:
@@ -79,19 +77,12 @@ class Found:
                 return fail(context, f"stuck: found itself, but {result.status} ({result.reason})")
             context.wandering.plan_at_s = context.t_s + PLAN_AGAIN_S
             there = context.nearest_room_m(pose) if result.status is PlanStatus.START_BLOCKED else None
-            state = replace(self, towards_m=there)
-            return Move(state, context.wandering.step(readings, state._bearing_rad(pose)))
+            return Move(replace(self, towards_m=there), context.wandering.make_for(there, pose, readings))
         context.trail = []
         if context.reactive is not None:
             context.reactive.reset()
         context.take_plan("found", f"the robot knows where it is, ({pose.x_m:.2f}, {pose.y_m:.2f})")
         return Move(Following(context), STOP)
-
-    def _bearing_rad(self, pose: Pose2) -> float | None:
-        if self.towards_m is None:
-            return None
-        x, y = self.towards_m - (pose.x_m, pose.y_m)
-        return wrap_to_pi(math.atan2(y, x) - pose.theta_rad)
 
 
 def lose(context: Context, state: State) -> State:

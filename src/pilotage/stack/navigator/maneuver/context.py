@@ -103,6 +103,10 @@ class Context(Standing):
         """Whether a place that it should not be at is where it is, not what its estimate jumped to."""
         return belief.std_m < SURE * self.config.astray_m
 
+    def nearest_room_m(self, pose: Pose2) -> FloatArray | None:
+        """(2,) the nearest place of the map with room for the disc around it."""
+        return self.own_map.told.field.nearest_clear(pose.as_array()[:2], self._robot.radius_m)
+
     def planned(self, t_s: float, pose: Pose2, *, rest: bool = False) -> PlanResult:
         """What was found from there, around what it found on its way, if it can."""
         found, clearances_m = self.own_map.found_circles_m, self._clearances_m()

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
-from pilotage.core.types import STOP, Twist
+from pilotage.core.types import STOP, FloatArray, Twist
 from pilotage.sensors.readings import Readings
 from pilotage.stack.control.step_clear import STEP_S
 from pilotage.stack.interface import Belief, BeliefStatus, StackStatus
@@ -15,12 +15,15 @@ from pilotage.stack.navigator.state import Ended, Move, State
 from pilotage.stack.navigator.trail import Trail
 from pilotage.stack.navigator.yielding import Act
 from pilotage.stack.planning.plan_status import PlanStatus
+from pilotage.stack.planning.planner import PlanResult
 
 MOST_REPLANS, MOST_RESTS = 8, 3
 """How often it plans anew where it went astray, and for what a path that covers a floor left of it."""
 LOOK_S = 2.0
 """A robot that believes to stand in a wall looks around for so long before it plans anew: once, or until it
 knows its place. So does who plans a path that it would not plan again for what its first readings correct."""
+MOST_TRIES, PLAN_AGAIN_S = 30, 1.0
+"""Who found itself where no plan begins plans so often, this long apart, on its way to where one might."""
 DOUBT_S = 10.0
 """Who is lost stands for so long, and drives about then."""
 AROUND, BACKING = 0.6, 0.2
@@ -71,7 +74,29 @@ class Lost:
             return self.resumes.step(readings, belief)
         journal.say(t_s, "found", "the robot knows where it is and plans from there")
         context.begin_anew()
-        return plan(context, t_s, belief).step(readings, belief)
+        return Found(context).step(readings, belief)
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """Knows where it is again, and while no plan begins there makes for the nearest place that has room."""
+
+    context: Context
+    towards_m: FloatArray | None = None
+    plan_at_s: float = 0.0
+    tries: int = 0
+
+    def step(self, readings: Readings, belief: Belief) -> Move:
+        """Plan from there, or make for where a plan might begin."""
+        context, t_s, found = self.context, readings.t_s, self
+        if t_s >= self.plan_at_s:
+            result = context.planned(t_s, belief.pose)
+            if result.status is not PlanStatus.START_BLOCKED or self.tries == MOST_TRIES:
+                return set_out(context, t_s, belief, result).step(readings, belief)
+            there = context.nearest_room_m(belief.pose)
+            found = Found(context, there, t_s + PLAN_AGAIN_S, self.tries + 1)
+        context.look(readings, belief)
+        return Move(found, context.wandering.make_for(found.towards_m, belief.pose, readings))
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +152,11 @@ def first_state(context: Context, belief: Belief) -> State:
 
 def plan(context: Context, t_s: float, belief: Belief) -> State:
     """Plan from where it believes to be, and lay out the path."""
-    result = context.planned(t_s, belief.pose)
+    return set_out(context, t_s, belief, context.planned(t_s, belief.pose))
+
+
+def set_out(context: Context, t_s: float, belief: Belief, result: PlanResult) -> State:
+    """Lay out the path of a plan, or look around once more, or give up."""
     again, context.has_planned = context.has_planned, True
     if result.status is PlanStatus.START_BLOCKED and not (again and context.is_sure(belief)):
         return LookingAround(context, t_s + LOOK_S)
