@@ -252,3 +252,19 @@ def test_weak_brakes_slow_down_before_a_wall_rather_than_plan_anew(tmp_path: Pat
     assert metrics["success"]
     assert metrics["collisions"] == 0
     assert (metrics["replans"], metrics["escapes"]) == (0, 0)
+
+
+def test_what_comes_late_and_at_once_is_no_speed() -> None:
+    """At 0.8 m/s it was taken for 1.6 m/s fast, and refused to turn where there was room for that."""
+    sheet = replace(told_of().robot, motion=DifferentialDriveConfig(**WEAK), sensors=ODOMETRY, dt_s=DT_S)
+    arc_stop, told = arc_stop_of(sheet), Twist(0.8, 0.4)
+    for step in range(60):
+        late = 2.0 if step == 59 else 0.0 if step == 58 else 1.0
+        moved = {"odometry": OdometryIncrement(late * 0.08, late * 0.04)} if late else {}
+        arc_stop.take_in(Readings(step * DT_S, moved))
+        if step < 59:
+            arc_stop.sent(told)
+    rolls_on = arc_stop.follows(STOP)
+    assert 0.8 < rolls_on.v_m_s <= 1.0
+    faster = Twist(1.0, 0.5)
+    assert arc_stop.follows(faster) == faster

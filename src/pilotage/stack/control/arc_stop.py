@@ -64,7 +64,8 @@ class ArcStop:
         distance_var, _ = increment_variances(driven_m, told.angle_rad, *sheet.densities)
         noise_m_s = STDS * math.sqrt(distance_var) / dt_s
         if math.hypot(along_m_s, across_m_s) > self._may_differ_m_s + noise_m_s:
-            self._going = Twist(told.distance_m / dt_s, told.angle_rad / dt_s, told.lateral_m / dt_s)
+            over_s = max(dt_s, driven_m / self._top_m_s)
+            self._going = Twist(told.distance_m / over_s, told.angle_rad / over_s, told.lateral_m / over_s)
 
     def sent(self, command: Twist) -> None:
         """A command left."""
