@@ -24,7 +24,7 @@ STRATEGY_NUMBERS: dict[str, frozenset[str]] = {
     "adaptive-rounds": frozenset(
         {
             "by_chance",
-            "mean_weight",
+            "mean_weights",
             "most_slack",
             "sharing_cost",
             "forecast_mean_weight",

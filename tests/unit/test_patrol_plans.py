@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pilotage.kernels.patrol.rounds import BACK, judge_walk, plan_cost
-from pilotage.stack.patrol.forecast import forecast_m
+from pilotage.stack.patrol.forecast import Driving, forecast_m
 from pilotage.stack.patrol.graph import PatrolGraph
 from pilotage.stack.patrol.partition import Plan, annealed, even_sizes, partition
 from pilotage.stack.patrol.passages import Passages
@@ -112,6 +112,26 @@ def test_a_pair_that_shares_a_short_round_keeps_no_plan_from_being_taken() -> No
     alone = partition(graph, (1, 1, 1, 1))
     assert plan.worst_m < alone.worst_m
     assert plan.mean_m < 0.97 * alone.mean_m
+
+
+@pytest.mark.parametrize("seed", [4, 8])
+def test_no_plan_is_above_a_share_for_each_robot(seed: int) -> None:
+    """One round for all eight was taken for its worst; its mean was 5 and 8 % above that of shares."""
+    graph = random_graph(seed)
+    setting, config = setting_for(graph, tuple(range(8))), AdaptiveRoundsConfig()
+    driving = Driving(
+        visit_m=setting.visit_m,
+        turn_m=setting.turn_m,
+        meeting_m=config.meeting_m,
+        leg_spread_m=config.leg_spread_m,
+        slack=config.slack,
+        most_slack=config.most_slack,
+        beside_m=config.beside_passage_m,
+        talks=setting.talks,
+    )
+    plans = best_plan(setting, [1.0] * 8, config), partition(graph, (1,) * 8)
+    ours, alone = (np.array(forecast_m(plan, graph, setting.passages, driving)) for plan in plans)
+    assert (ours <= 1.01 * alone).all()
 
 
 def test_rounds_that_only_turn_back_are_not_taken_for_short() -> None:
