@@ -48,19 +48,19 @@ class Ground:
     speed_m_s: float
     lane_m: float
 
-    def nodes(self, spacing_m: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def nodes(self, spacing_m: float, *, exact: bool) -> tuple[FloatArray, FloatArray, FloatArray]:
         """(rows, columns) seconds a metre, infinite where the body does not fit; and half widths.
 
         The first is the most room there is beside a node, also before and behind a door in a thin wall, which
         may be narrower by some decimetres: what passages are settled by. The second is the door's own.
-        Row 0 has the lowest y.
+        Row 0 has the lowest y. Between its nodes the field leaves no room in passages that the body just
+        fits through; ``exact`` distances do, where walls are known as lines.
         """
         xmin, ymin, xmax, ymax = self.bounds_m
         xs = np.arange(xmin, xmax + 0.5 * spacing_m, spacing_m)
         ys = np.arange(ymin, ymax + 0.5 * spacing_m, spacing_m)
         grid = np.stack(np.meshgrid(xs, ys), axis=-1)
-        if self._is_exact and spacing_m < self.field.resolution_m:
-            # Between its nodes the field leaves no room in passages that the body just fits through.
+        if exact:
             distance = self._exact(spacing_m, *grid.shape[:2])
         else:
             distance = self.field.at(grid.reshape(-1, 2)).reshape(grid.shape[:2])
@@ -83,11 +83,11 @@ class Ground:
         Between nodes a corridor's middle seems nearer to its walls, by up to half of what they are apart: it
         would have room for two or not by where nodes happen to lie.
         """
-        most = FINER[0] if self._is_exact else max(1, round(spacing_m / self.field.resolution_m))
+        most = FINER[0] if self.knows_walls else max(1, round(spacing_m / self.field.resolution_m))
         finer = next((f for f in FINER if f <= most and f * f * distance.size <= MOST_POINTS), 1)
         rows, columns = (finer * (n - 1) + 1 for n in distance.shape)
         (x0, y0), step_m = self.bounds_m[:2], spacing_m / finer
-        if self._is_exact:
+        if self.knows_walls:
             values = self._exact(step_m, rows, columns)
         else:
             xs, ys = x0 + step_m * np.arange(columns), y0 + step_m * np.arange(rows)
@@ -95,8 +95,8 @@ class Ground:
         return DistanceField(values, (x0, y0), step_m, self.field.segments_m, self.field.circles_m)
 
     @property
-    def _is_exact(self) -> bool:
-        """Whether walls are known as lines."""
+    def knows_walls(self) -> bool:
+        """Whether they are known as lines and discs."""
         return len(self.field.segments_m) + len(self.field.circles_m) > 0
 
     def _exact(self, step_m: float, rows: int, columns: int) -> FloatArray:
