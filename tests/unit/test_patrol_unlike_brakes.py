@@ -56,7 +56,7 @@ def least_gap_m(
             # What was seen then, where it is from here.
             before = before_m - [[v[1] * PERIOD, 0.0]]
             nearer = disc_returns.rolling_on(
-                front, before, PERIOD, 0.5, 0.05, RADIUS, GAP, REACTION, brakings[0]
+                front, before, PERIOD, 0.5, 0.05, RADIUS, GAP, REACTION, np.array(brakings[:1])
             )
             seen = np.concatenate([front, nearer])
         strong = told_m_s(v[1], tops_m_s[1], brakings[1], seen)
@@ -101,12 +101,18 @@ def tell(context: Any, number: int, x_m: float, braking_m_s2: float | None) -> N
 
 def test_the_weakest_is_who_may_be_near_by_what_it_told_or_its_data_sheet() -> None:
     context = context_of(0.5, 2.0, 1.0)
-    assert context.weakest_m_s2(3.0) == 0.5, "nobody was heard: each may be anywhere"
+
+    def weakest() -> list[float]:
+        found = context.weaker_m_s2(np.array([[3.0, 3.3], [7.8, 3.0]]), 1.5)
+        return [float(braking) for braking in found]
+
+    assert weakest() == [0.5, 0.5], "nobody was heard: each may be anywhere"
     tell(context, 0, 8.0, None)
-    assert context.weakest_m_s2(3.0) == 1.0, "it is far away"
-    assert context.weakest_m_s2(8.0) == 0.5
+    assert weakest() == [1.0, 0.5], "the weakest is told to be far away from the first place"
     tell(context, 2, 3.0, 0.4)
-    assert context.weakest_m_s2(3.0) == 0.4, "its brakes have proved to be weaker"
+    assert weakest() == [0.4, 0.5], "its brakes have proved to be weaker"
+    tell(context, 2, 3.0, 1.8)
+    assert weakest() == [math.inf, 0.5], "its brakes are as good as one's own"
 
 
 @pytest.mark.parametrize(("mate_m_s2", "slower"), [(0.3, True), (2.0, False)])

@@ -242,21 +242,23 @@ def rolling_on(
     radius: float,
     gap: float,
     reaction: float,
-    deceleration: float,
+    decelerations: FloatArray,
 ) -> FloatArray:
     """Of those of returns (M, 2) that need more than their own half of the distance to stop, where to take
     them to be, so that what they leave is this robot's half: (K, 2), nearer in the same directions.
 
     Parameters
     ----------
-    before, dt, same, slow, radius, gap, reaction, deceleration
+    before, dt, same, slow, radius, gap, reaction
         As ``coming_on``.
+    decelerations
+        (M,) of who may be seen there.
     """
     kept = np.empty_like(points)
     count = 0
     for i in range(points.shape[0]):
         away, speed = nearing(points[i, 0], points[i, 1], before, dt, same)
-        free, rolls = away - radius - gap, speed * reaction + 0.5 * speed * speed / deceleration
+        free, rolls = away - radius - gap, speed * reaction + 0.5 * speed * speed / decelerations[i]
         if speed > slow and rolls > 0.5 * free > 0.0:
             kept[count] = points[i] * (radius + gap + 2.0 * max(free - rolls, 0.0)) / away
             count += 1

@@ -42,7 +42,8 @@ class Onward:
             return NO_POINTS
         seen_m = senses.pose.seen(before_m)
         how = seen_m, since_s, SAME_M, SLOW_M_S, senses.radius_m, senses.config.gap_m, self._reaction_s
-        weakest_m_s2 = senses.weakest_m_s2(senses.config.look_m)
-        if weakest_m_s2 < ALIKE * senses.brakes.sure_m_s2:
-            self.fronts = disc_returns.rolling_on(senses.strange, *how, weakest_m_s2)
+        weaker_m_s2 = senses.weaker_m_s2(self._before_m, ALIKE * senses.brakes.sure_m_s2)
+        weak = np.isfinite(weaker_m_s2)
+        if weak.any():
+            self.fronts = disc_returns.rolling_on(senses.strange[weak], *how, weaker_m_s2[weak])
         return disc_returns.coming_on(near, *how, self._braking_m_s2) if len(near) else NO_POINTS

@@ -274,14 +274,19 @@ class Senses:
         within_s = HEARD_PERIODS * self.config.message_period_s
         return self._last_words.whereabouts(t_s, within_s, TOLD_M, self.speed_m_s)
 
-    def weakest_m_s2(self, within_m: float) -> float:
-        """The weakest brakes of a mate that may be within so far: as it told, or as its data sheet says."""
-        weakest, own = math.inf, self.task.robot
-        for number, (x, y, off_m, _) in enumerate(self.mates_by_their_words(self.t_s).tolist()):
-            away_m = math.hypot(x - self.pose.x_m, y - self.pose.y_m) - off_m
-            if number != own and not away_m > within_m:  # nor is it known of who was not heard
-                told = self.mates[number][1].braking_m_s2 if number in self.mates else None
-                weakest = min(weakest, self.task.brakings_m_s2[number] if told is None else told)
+    def weaker_m_s2(self, places: FloatArray, than_m_s2: float) -> FloatArray:
+        """(M,) the weakest brakes, below some, of the mates that may be seen at places (M, 2) of the map.
+
+        As each told last, or as its data sheet says; infinite where none may be. Who was not heard may be
+        anywhere.
+        """
+        weakest, own = np.full(len(places), math.inf), self.task.robot
+        for number, (x, y, off_m, radius_m) in enumerate(self.mates_by_their_words(self.t_s).tolist()):
+            told = self.mates[number][1].braking_m_s2 if number in self.mates else None
+            braking = self.task.brakings_m_s2[number] if told is None else told
+            if number != own and braking < than_m_s2:
+                elsewhere = np.hypot(*(places - (x, y)).T) > off_m + radius_m
+                weakest[~elsewhere] = np.minimum(weakest[~elsewhere], braking)
         return weakest
 
     def hears_all(self) -> bool:
