@@ -234,13 +234,13 @@ def test_a_laser_that_sees_next_to_nothing_is_refused_at_once(reach_m: float) ->
         derive_graph(WORLD, Floor.of(WORLD, 0.3), DerivationConfig(reach_m=reach_m))
 
 
-def passage(width_m: float, low: float = 2.03) -> WorldMap:
-    """Two rooms, and a passage of 2 m from one to the other, off the lattice of everything."""
-    high = low + width_m
-    walls = [[0, 0, 4, 0], [0, 0, 0, 5], [0, 5, 4, 5], [4, 0, 4, low], [4, high, 4, 5]]
-    walls += [[4, low, 6, low], [4, high, 6, high]]
-    walls += [[6, 0, 6, low], [6, high, 6, 5], [6, 0, 10, 0], [10, 0, 10, 5], [6, 5, 10, 5]]
-    rooms = SegmentMap(np.array(walls, dtype=float), np.zeros((0, 3)), (0.0, 0.0, 10.0, 5.0))
+def passage(width_m: float, low: float = 2.03, begin: float = 4.0, end: float = 6.0) -> WorldMap:
+    """Two rooms, and a passage from one to the other, off the lattice of everything."""
+    high, far = low + width_m, end + 4.0
+    walls = [[0, 0, begin, 0], [0, 0, 0, 5], [0, 5, begin, 5], [begin, 0, begin, low]]
+    walls += [[begin, high, begin, 5], [begin, low, end, low], [begin, high, end, high]]
+    walls += [[end, 0, end, low], [end, high, end, 5], [end, 0, far, 0], [far, 0, far, 5], [end, 5, far, 5]]
+    rooms = SegmentMap(np.array(walls, dtype=float), np.zeros((0, 3)), (0.0, 0.0, far, 5.0))
     return WorldMap("passage", rooms.bounds_m, rooms)
 
 
@@ -255,6 +255,15 @@ def test_a_derived_graph_counts_on_what_can_be_driven(width_m: float, both: bool
     assert all(math.isfinite(roadmap.longest_s(vertex)) for vertex in range(len(vertices)))
 
 
+def test_a_place_behind_a_door_that_is_too_narrow_is_left_out_however_near_the_door() -> None:
+    """The nearest cell of the floor that was left lay before the door, and the mission was refused."""
+    world = passage(0.75, low=2.03, begin=2.72, end=2.81)
+    _, derived = derive_drivable(world, 0.3, (4.8, 2.0))
+    vertices = derived.graph.vertices_xy_m
+    assert vertices[:, 0].min() > 2.81
+    Roadmap(world, vertices, np.zeros((0, 2)), 0.38, 1.0, 0.15, 0.5, 0.35)
+
+
 def test_a_passage_whose_middle_lies_between_two_cells_is_part_of_the_floor() -> None:
     """Of a floor with corridors of 0.9 m all but one room was left out without a word."""
     world = passage(0.88, low=1.96)
@@ -266,9 +275,11 @@ def test_a_passage_whose_middle_lies_between_two_cells_is_part_of_the_floor() ->
     assert len(derive_drivable(world, 0.3, (5.0, 2.4))[1].graph) == len(derived.graph)
 
 
-def test_a_passage_between_the_nodes_is_found_on_finer_ones() -> None:
+@pytest.mark.parametrize(("width_m", "low"), [(0.86, 2.03), (0.8, 2.03), (0.79, 2.05)])
+def test_a_passage_between_the_nodes_is_found_on_finer_ones(width_m: float, low: float) -> None:
+    """Also where the nodes of the map's distances leave no room in its middle."""
     places = np.array([[2.0, 2.5], [8.0, 2.5]])
-    roadmap = Roadmap(passage(0.86), places, np.zeros((0, 2)), 0.38, 1.0, 0.15, 0.5, 0.35)
+    roadmap = Roadmap(passage(width_m, low), places, np.zeros((0, 2)), 0.38, 1.0, 0.15, 0.5, 0.35)
     assert roadmap.spacing_m < 0.15
     assert 6.0 < roadmap.longest_s(0) < 14.0
     with pytest.raises(InputError, match="found none from vertex 0 to 1 of 2"):

@@ -113,6 +113,33 @@ class TestStopping:
             )
         assert pose[0] > 1.0
 
+    @pytest.mark.parametrize("acceleration", [0.3, 0.5, 2.0])
+    def test_who_stands_beside_the_field_sets_out_however_slowly_it_speeds_up(
+        self, acceleration: float
+    ) -> None:
+        """A place told 0.3 m wrong has no time to go; in its first arc a weak one comes 3 cm nearer."""
+        limits = np.array([1.0, acceleration, acceleration, 2.0, 8.0, 0.1])
+        safety = np.array([0.15, 0.3, 0.06, 0.1, 1.4])
+        time = np.tile(6.0 - 0.15 * np.arange(41), (41, 1))
+        time[:, :20] = np.inf
+        pose, v, w = np.array([-0.2, 0.0, 0.0]), 0.0, 0.0
+        for _ in range(100):
+            v, w, _ = voronoi_window.choose(
+                v,
+                w,
+                pose,
+                limits,
+                safety,
+                (NOBODY, NOBODY, NOBODY),
+                (time, -3.0, -3.0, 0.15),
+                NO_GATE,
+                (NO_MAP, 0.0, 0.0, 0.1),
+                0.0,
+                (0.9, 0.3, 0.5, 0.25, 6, 15, 0.0),
+            )
+            pose = pose + 0.1 * np.array([v * math.cos(pose[2]), v * math.sin(pose[2]), w])
+        assert pose[0] > 0.5
+
     @pytest.mark.parametrize(("x_m", "y_m"), [(-0.222, 0.17), (-0.25, 0.19), (-0.222, -0.17)])
     def test_who_came_to_rest_beside_the_edge_of_a_door_gets_through(self, x_m: float, y_m: float) -> None:
         """The field knows one row of nodes in the door, and leads into its edge."""

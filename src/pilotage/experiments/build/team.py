@@ -140,6 +140,7 @@ def _shares(
     talks = sum(radio.loss < 1.0 for radio in radios) > 1
     speeds_m_s = np.array([sheet.motion.top_speed_m_s for sheet in sheets])
     radii_m = tuple(sheet.radius_m for sheet in sheets)
+    brakings_m_s2 = tuple(sheet.motion.braking_m_s2 for sheet in sheets)
     shares = []
     for index, sheet in enumerate(sheets):
         setting = PatrolSetting(
@@ -156,7 +157,9 @@ def _shares(
             speeds_m_s=speeds_m_s.copy(),
         )
         strategy = build_component(STRATEGIES, mission.team.strategy, "strategy", setting)
-        share = PatrolTask(graph, site.visit_m, site.near_m, site.starts, index, strategy, radii_m, supply)
+        share = PatrolTask(
+            graph, site.visit_m, site.near_m, site.starts, index, strategy, radii_m, brakings_m_s2, supply
+        )
         shares.append(share)
     return shares
 

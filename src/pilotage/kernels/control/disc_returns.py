@@ -223,22 +223,60 @@ def coming_on(
     kept = np.empty_like(points)
     count = 0
     for i in range(points.shape[0]):
-        px, py = points[i, 0], points[i, 1]
-        least = np.inf
-        for k in range(before.shape[0]):
-            bx, by = before[k, 0], before[k, 1]
-            if (px - bx) * (px - bx) + (py - by) * (py - by) < same * same:
-                least = min(least, bx * bx + by * by)
-        away = math.hypot(px, py)
-        if not (least < np.inf and math.sqrt(least) > away):
-            continue
-        speed = (math.sqrt(least) - away) / dt
+        away, speed = nearing(points[i, 0], points[i, 1], before, dt, same)
         if speed > slow and speed * reaction + 0.5 * speed * speed / deceleration > 0.5 * max(
             away - radius - gap, 0.0
         ):
             kept[count] = points[i]
             count += 1
     return kept[:count]
+
+
+@kernel
+def rolling_on(
+    points: FloatArray,
+    before: FloatArray,
+    dt: float,
+    same: float,
+    slow: float,
+    radius: float,
+    gap: float,
+    reaction: float,
+    decelerations: FloatArray,
+) -> FloatArray:
+    """Of those of returns (M, 2) that need more than their own half of the distance to stop, where to take
+    them to be, so that what they leave is this robot's half: (K, 2), nearer in the same directions.
+
+    Parameters
+    ----------
+    before, dt, same, slow, radius, gap, reaction
+        As ``coming_on``.
+    decelerations
+        (M,) of who may be seen there.
+    """
+    kept = np.empty_like(points)
+    count = 0
+    for i in range(points.shape[0]):
+        away, speed = nearing(points[i, 0], points[i, 1], before, dt, same)
+        free, rolls = away - radius - gap, speed * reaction + 0.5 * speed * speed / decelerations[i]
+        if speed > slow and rolls > 0.5 * free > 0.0:
+            kept[count] = points[i] * (radius + gap + 2.0 * max(free - rolls, 0.0)) / away
+            count += 1
+    return kept[:count]
+
+
+@kernel
+def nearing(px: float, py: float, before: FloatArray, dt: float, same: float) -> tuple[float, float]:
+    """How far a return is away, and how fast it came nearer: by the nearest of those (K, 2) of a scan before
+    that are within ``same`` of it; 0 where none is.
+    """
+    least = np.inf
+    for k in range(before.shape[0]):
+        bx, by = before[k, 0], before[k, 1]
+        if (px - bx) * (px - bx) + (py - by) * (py - by) < same * same:
+            least = min(least, bx * bx + by * by)
+    away = math.hypot(px, py)
+    return away, max(math.sqrt(least) - away, 0.0) / dt if least < np.inf else 0.0
 
 
 @kernel

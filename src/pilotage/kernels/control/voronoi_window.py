@@ -182,8 +182,13 @@ def choose(
     turn = free_turn(pose, limits, safety, within_reach, field, known, heading_cost)
     if not abs(turn) < np.inf:
         return best_v, best_w, HELD
-    if abs(turn) < math.pi / HEADINGS and moves < np.inf:
-        return moves_v, moves_w, FREE
+    if abs(turn) < math.pi / HEADINGS:
+        if moves < np.inf:
+            return moves_v, moves_w, FREE
+        # Beside the field no arc that it can drive at first may end in it.
+        v = min(high_v, acceleration * period)
+        if stop_is_clear(v0, w0, v, 0.0, limits, safety, within_reach, pose, known):
+            return v, 0.0, FREE
     # As fast as it can stop from there.
     w = math.copysign(math.sqrt(2.0 * turn_acceleration * abs(turn)), turn)
     w = min(max(w, low_w), high_w)

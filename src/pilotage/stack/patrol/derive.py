@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
@@ -157,12 +157,14 @@ def derive_drivable(
     floor = Floor.of(world, radius_m, inside_xy_m=inside_xy_m)
     derived = derive_graph(world, floor, config)
     roomy = Floor.of(world, radius_m + config.room_m, inside_xy_m=inside_xy_m)
+    # Behind a door that is too narrow the nearest of its cells that are reached may be before the door.
+    fits = replace(roomy, reachable=roomy.clearance_m >= roomy.radius_m)
     try:
-        for place in derived.graph.vertices_xy_m:
-            roomy.nearest_cell(place)
-    except InputError:
-        return roomy, derive_graph(world, roomy, config)
-    return floor, derived
+        if all(roomy.reachable[fits.nearest_cell(place)] for place in derived.graph.vertices_xy_m):
+            return floor, derived
+    except InputError:  # there is no room for it at the place itself
+        pass
+    return roomy, derive_graph(world, roomy, config)
 
 
 def views(

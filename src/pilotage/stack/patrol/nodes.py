@@ -48,18 +48,22 @@ class Ground:
     speed_m_s: float
     lane_m: float
 
-    def nodes(self, spacing_m: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def nodes(self, spacing_m: float, *, exact: bool) -> tuple[FloatArray, FloatArray, FloatArray]:
         """(rows, columns) seconds a metre, infinite where the body does not fit; and half widths.
 
         The first is the most room there is beside a node, also before and behind a door in a thin wall, which
         may be narrower by some decimetres: what passages are settled by. The second is the door's own.
-        Row 0 has the lowest y.
+        Row 0 has the lowest y. Between its nodes the field leaves no room in passages that the body just
+        fits through; ``exact`` distances do, where walls are known as lines.
         """
         xmin, ymin, xmax, ymax = self.bounds_m
         xs = np.arange(xmin, xmax + 0.5 * spacing_m, spacing_m)
         ys = np.arange(ymin, ymax + 0.5 * spacing_m, spacing_m)
         grid = np.stack(np.meshgrid(xs, ys), axis=-1)
-        distance = self.field.at(grid.reshape(-1, 2)).reshape(grid.shape[:2])
+        if exact:
+            distance = self._exact(spacing_m, *grid.shape[:2])
+        else:
+            distance = self.field.at(grid.reshape(-1, 2)).reshape(grid.shape[:2])
         slowness = self._slowness(distance)
         fine = self._fine(spacing_m, distance)
         return slowness, self._room(spacing_m, fine, distance.shape), self._half_widths(fine, grid, distance)
@@ -79,18 +83,26 @@ class Ground:
         Between nodes a corridor's middle seems nearer to its walls, by up to half of what they are apart: it
         would have room for two or not by where nodes happen to lie.
         """
-        walls = self.field.segments_m, self.field.circles_m
-        is_exact = sum(map(len, walls)) > 0
-        most = FINER[0] if is_exact else max(1, round(spacing_m / self.field.resolution_m))
+        most = FINER[0] if self.knows_walls else max(1, round(spacing_m / self.field.resolution_m))
         finer = next((f for f in FINER if f <= most and f * f * distance.size <= MOST_POINTS), 1)
         rows, columns = (finer * (n - 1) + 1 for n in distance.shape)
         (x0, y0), step_m = self.bounds_m[:2], spacing_m / finer
-        if is_exact:
-            values = sample_distance(x0, y0, step_m, columns, rows, *walls)
+        if self.knows_walls:
+            values = self._exact(step_m, rows, columns)
         else:
             xs, ys = x0 + step_m * np.arange(columns), y0 + step_m * np.arange(rows)
             values = self.field.at(np.stack(np.meshgrid(xs, ys), axis=-1)).reshape(rows, columns)
-        return DistanceField(values, (x0, y0), step_m, *walls)
+        return DistanceField(values, (x0, y0), step_m, self.field.segments_m, self.field.circles_m)
+
+    @property
+    def knows_walls(self) -> bool:
+        """Whether they are known as lines and discs."""
+        return len(self.field.segments_m) + len(self.field.circles_m) > 0
+
+    def _exact(self, step_m: float, rows: int, columns: int) -> FloatArray:
+        """(rows, columns) distances at points so far apart."""
+        walls = self.field.segments_m, self.field.circles_m
+        return sample_distance(*self.bounds_m[:2], step_m, columns, rows, *walls)
 
     def _room(self, spacing_m: float, fine: DistanceField, shape: tuple[int, ...]) -> FloatArray:
         """(rows, columns) the most room there is beside a node, no farther than a lane."""

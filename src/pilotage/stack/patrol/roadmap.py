@@ -82,10 +82,19 @@ class Roadmap:
                 f"stack.navigator.spacing_m: expected at most {MOST_NODES} nodes on a map of "
                 f"{xmax - xmin:.1f} x {ymax - ymin:.1f} m, found {spacing_m:g} m between them; take more"
             )
+        try:
+            self._lay_wide(spacing_m, exact=False)
+        except InputError:
+            if not self._ground.knows_walls:
+                raise
+            self._lay_wide(spacing_m, exact=True)
+
+    def _lay_wide(self, spacing_m: float, *, exact: bool) -> None:
+        """Lay the nodes so that paths lead from place to place, wide ones if they need not be too many."""
         joined_m: float | None = None
         for finer in FINER:
             try:
-                self._lay(spacing_m / finer)
+                self._lay(spacing_m / finer, exact=exact)
                 if self._is_wide():
                     return
                 joined_m = joined_m or self.spacing_m
@@ -95,12 +104,12 @@ class Roadmap:
             if 4 * self.slowness.size > MOST_NODES:
                 break
         assert joined_m is not None, "else it was refused"
-        self._lay(joined_m)
+        self._lay(joined_m, exact=exact)
 
-    def _lay(self, spacing_m: float) -> None:
+    def _lay(self, spacing_m: float, *, exact: bool) -> None:
         """Lay the nodes over the ground."""
-        self.spacing_m, self.origin_xy_m = spacing_m, self._ground.bounds_m[:2]
-        self.slowness, self.room_m, self._width_m = self._ground.nodes(spacing_m)
+        self.spacing_m, self.origin_xy_m, self._exact = spacing_m, self._ground.bounds_m[:2], exact
+        self.slowness, self.room_m, self._width_m = self._ground.nodes(spacing_m, exact=exact)
         # Where there is room for all fields nobody need know which of them was asked for last.
         self._all_kept = len(self._places) * self.slowness.nbytes <= MOST_FIELD_BYTES
         self._seeds = self._joined(self._ground.clearance_m)
@@ -127,7 +136,7 @@ class Roadmap:
                 found = copy.copy(self)
                 found._fields, found._others, found._whole, found._finer = {}, {}, found, found
                 try:
-                    found._lay(self.spacing_m / FINER[1])
+                    found._lay(self.spacing_m / FINER[1], exact=self._exact)
                     self._finer = found
                 except InputError:
                     self._finer = self

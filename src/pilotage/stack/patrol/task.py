@@ -95,8 +95,8 @@ class PatrolTask:
         Its number.
     strategy
         Who says where to go next.
-    radii_m
-        (N,) of the discs around all robots.
+    radii_m, brakings_m_s2
+        (N,) of the discs around all robots, and how hard each brakes by its data sheet.
     supply
         None where it never has to charge.
     """
@@ -108,6 +108,7 @@ class PatrolTask:
     robot: int
     strategy: Strategy
     radii_m: tuple[float, ...]
+    brakings_m_s2: tuple[float, ...]
     supply: Supply | None = None
 
     @property

@@ -87,6 +87,8 @@ class TeamWord:
         than from others it keeps from each.
     talk
         When to expect more; None: nothing is known of that.
+    braking_m_s2
+        What it can be relied on to brake with; None: what its data sheet says.
     """
 
     x_m: float
@@ -98,3 +100,4 @@ class TeamWord:
     radius_m: float
     standing: tuple[tuple[float, float, float], ...] = ()
     talk: Talk | None = None
+    braking_m_s2: float | None = None

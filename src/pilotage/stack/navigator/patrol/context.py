@@ -127,6 +127,7 @@ class Context(Paths):
                 self.radius_m,
                 self._obstructions.told(),
                 self.talk_habit,
+                self.brakes.sure_m_s2,
             )
         )
 

@@ -23,6 +23,9 @@ class Mates:
     def __len__(self) -> int:
         return len(self._said)
 
+    def __contains__(self, number: int) -> bool:
+        return number in self._said
+
     def __getitem__(self, number: int) -> tuple[float, TeamWord]:
         """When a mate's last word was sent, and the word."""
         return self._said[number]

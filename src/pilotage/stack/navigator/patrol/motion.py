@@ -83,7 +83,7 @@ class Motion:
         self._reckon_with(braking)
         self._room: tuple[FloatArray, Pose2, tuple[float, float]] | None = None
         self._still, self._meets = StillWatch(), Onward(period_s + LATENCY_S, braking)
-        self._onward = self._hidden = NO_POINTS
+        self._onward = self._fronts = NO_POINTS
         self._hidden_mates = HiddenMates(senses, roadmap)
         self._swings_s = period_s + LATENCY_S + turn_rate / turning
         self.standing = NO_POINTS
@@ -109,7 +109,8 @@ class Motion:
         beside = self._beside()
         self._onward = self._meets.step(self._senses, beside)
         self.standing = self._still.step(self._senses.t_s, self._mute(beside), self._senses.fell_silent())
-        self._hidden = NO_POINTS if lost else self._hidden_mates.fronts(self._stop_m())
+        hidden = NO_POINTS if lost else self._hidden_mates.fronts(self._stop_m())
+        self._fronts = np.concatenate([hidden, self._meets.fronts])
 
     def _stop_m(self) -> float:
         """What it needs at most to stop, of what it can be told now."""
@@ -248,7 +249,7 @@ class Motion:
             pose.as_array(),
             limits,
             self._safety,
-            (senses.near, np.concatenate([senses.strange, self._hidden]), self._give_way_to_nobody()),
+            (senses.near, np.concatenate([senses.strange, self._fronts]), self._give_way_to_nobody()),
             field,
             gate,
             senses.field(lost=False),

@@ -274,6 +274,21 @@ class Senses:
         within_s = HEARD_PERIODS * self.config.message_period_s
         return self._last_words.whereabouts(t_s, within_s, TOLD_M, self.speed_m_s)
 
+    def weaker_m_s2(self, places: FloatArray, than_m_s2: float) -> FloatArray:
+        """(M,) the weakest brakes, below some, of the mates that may be seen at places (M, 2) of the map.
+
+        As each told last, or as its data sheet says; infinite where none may be. Who was not heard may be
+        anywhere.
+        """
+        weakest, own = np.full(len(places), math.inf), self.task.robot
+        for number, (x, y, off_m, radius_m) in enumerate(self.mates_by_their_words(self.t_s).tolist()):
+            told = self.mates[number][1].braking_m_s2 if number in self.mates else None
+            braking = self.task.brakings_m_s2[number] if told is None else told
+            if number != own and braking < than_m_s2:
+                elsewhere = np.hypot(*(places - (x, y)).T) > off_m + radius_m
+                weakest[~elsewhere] = np.minimum(weakest[~elsewhere], braking)
+        return weakest
+
     def hears_all(self) -> bool:
         """Whether no mate is silent, or lost."""
         words = self.heard()
