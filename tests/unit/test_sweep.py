@@ -185,6 +185,39 @@ def test_of_an_error_that_passes_overlap_for_nobody_drives_back() -> None:
     assert np.array_equal(swept, covered(floor, xy, 0.8))
 
 
+def test_who_is_off_alike_on_passes_beside_one_another_does_not_drive_back() -> None:
+    """On cells of 0.1 m robots are off by up to half of one: 485 m were driven for 1.3 m² that were swept."""
+    world, whole = swept_floor("a room")
+    assert whole.path is not None
+    xy, floor = whole.path.states[:, :2], Floor.of(world, 0.4, 0.01, (1.0, 1.0))
+    std_m = np.full(len(xy), 0.0206)
+    std_m[::10] = 0.0527
+    swept = surely_covered(floor, np.column_stack([xy, std_m]), 0.8, 0.02)
+    assert np.array_equal(swept, covered(floor, xy, 0.8))
+    std_m[::10] = 0.2
+    assert not np.array_equal(surely_covered(floor, np.column_stack([xy, std_m]), 0.8, 0.02), swept)
+
+
+@pytest.mark.parametrize(("unsure_m", "overlap_m"), [(0.0, 0.0024), (0.01, 0.015), (1.0, 0.04)])
+def test_passes_overlap_by_more_where_the_robot_is_unsure_of_its_place(
+    unsure_m: float, overlap_m: float
+) -> None:
+    """Two of 80 m x 44 m were left at 99.976 and 99.985 %: 12 mm, where lines were up to 18 mm apart."""
+    world, _ = swept_floor("a room")
+    config = BoustrophedonConfig(width_m=0.8, clearance_m=0.4, overlap_m=0.0024)
+    rng = np.random.default_rng(0)
+    request = PlanRequest(Pose2(1.0, 1.0, 0.0), Goal(1.0, 1.0), world.field, rng, unsure_m=unsure_m)
+    path = BoustrophedonPlanner(config).plan(request).path
+    assert path is not None
+    floor = Floor.of(world, 0.4, 0.8 / 36, (1.0, 1.0), exact=True)
+    left = [
+        np.count_nonzero(floor.reachable & ~covered(floor, path.states[:, :2], 0.8 - narrower_m))
+        for narrower_m in (overlap_m, overlap_m + 0.06)
+    ]
+    assert left[0] <= 0.001 * np.count_nonzero(floor.reachable)
+    assert left[1] > 5 * left[0] + 20, "passes overlap by no more than that"
+
+
 def test_how_far_along_a_corridor_it_was_takes_nothing_off_what_it_swept() -> None:
     """Lines of 40 m beside walls 3 m apart were driven again and again: 1.49 times area over width."""
     cov = np.diag([0.04, 1e-6, 1e-6])
@@ -344,6 +377,21 @@ class TestTask:
         assert [event.kind for event in run.events] == ["plan", "rest", "arrived"]
         assert len(run.robots[0].plans) == 2
         assert metrics["success"], metrics["reason"]
+
+    def test_its_passes_overlap_by_how_unsure_it_is(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        plan, asked = BoustrophedonPlanner.plan, []
+
+        def plans(self: BoustrophedonPlanner, request: PlanRequest) -> PlanResult:
+            asked.append(request.unsure_m)
+            return plan(self, request)
+
+        monkeypatch.setattr(BoustrophedonPlanner, "plan", plans)
+        run = run_loop(build(mission_of(MISSIONS["sweep-floor"], seed=0))).finished
+        trace = run.robots[0].trace
+        row = int(np.searchsorted(trace["t_s"], run.events[0].t_s))
+        xx, xy, yy = (trace[f"cov_{name}_m2"][row] for name in ("xx", "xy", "yy"))
+        least_m2 = np.linalg.eigvalsh([[xx, xy], [xy, yy]])[0]
+        assert asked[0] == pytest.approx(np.sqrt(least_m2), rel=1e-6)
 
     def test_it_plans_where_its_first_readings_show_it_to_be(self) -> None:
         """It planned from 0.1 m beside, and drove back in the end for what it had not swept there."""

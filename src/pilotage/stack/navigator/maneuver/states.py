@@ -127,7 +127,7 @@ def first_state(context: Context, belief: Belief) -> State:
 
 def plan(context: Context, t_s: float, belief: Belief) -> State:
     """Plan from where it believes to be, and lay out the path."""
-    result = context.planned(t_s, belief.pose)
+    result = context.planned(t_s, belief)
     again, context.has_planned = context.has_planned, True
     if result.status is PlanStatus.START_BLOCKED and not (again and context.is_sure(belief)):
         return LookingAround(context, t_s + LOOK_S)
@@ -216,7 +216,7 @@ def give_way(context: Context, state: Driving, t_s: float, belief: Belief, act: 
     """Having been held up for long: around what it sees, or back the way that it came."""
     context.held_up(math.inf if isinstance(state, BackingOut) else to_go_m)
     if context.holds.too_many:
-        around = context.planned_around(t_s, belief.pose)
+        around = context.planned_around(t_s, belief)
         found = "a path around leads no farther" if around.path is not None else around.reason
         return fail(context, t_s, f"stuck: something stands in its way: {found}")
     out: State | None = None
@@ -242,7 +242,7 @@ def back_out(
 
 def go_around(context: Context, t_s: float, belief: Belief) -> Following | None:
     """On a path around all that it sees, if there is one."""
-    result = context.planned_around(t_s, belief.pose)
+    result = context.planned_around(t_s, belief)
     path = context.plan.path
     if result.path is None or path is None:
         return None
@@ -273,9 +273,9 @@ def go_for_the_rest(context: Context, t_s: float, belief: Belief) -> Following |
     if context.trail is None or context.rests == MOST_RESTS:
         return None
     context.rests += 1
-    result = context.planned(t_s, belief.pose, rest=True)
+    result = context.planned(t_s, belief, rest=True)
     if not result.covers and context.own_map.forgets():
-        result = context.planned(t_s, belief.pose, rest=True)
+        result = context.planned(t_s, belief, rest=True)
     if result.path is None or not result.covers:
         return None
     context.lay_out(result.path, belief.pose.theta_rad)
