@@ -5,6 +5,8 @@ from __future__ import annotations
 import copy
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -25,6 +27,9 @@ from pilotage.models.footprint import Footprint
 from pilotage.stack.control.last_word import LastWord
 from pilotage.stack.control.own_half import OwnHalf
 from pilotage.stack.interface import Belief
+from pilotage.stack.navigator.maneuver import states
+from pilotage.stack.navigator.maneuver.context import Context
+from pilotage.stack.navigator.state import Ended
 from pilotage.stack.navigator.trail import Trail
 from pilotage.stack.planning.boustrophedon import BoustrophedonConfig, BoustrophedonPlanner
 from pilotage.stack.planning.node_search import line_length_m
@@ -402,6 +407,26 @@ class TestTask:
         told, plan = run.robots[0].trace, run.robots[0].plans[0]
         began = np.array([told["true_x_m"][0], told["true_y_m"][0]])
         assert np.hypot(*(plan.states[0, :2] - began)) < 0.01
+
+    @pytest.mark.parametrize("sure", [False, True])
+    def test_a_vague_estimates_jumps_do_not_each_ask_for_a_sweep(
+        self, monkeypatch: pytest.MonkeyPatch, sure: bool
+    ) -> None:
+        """Metres off along a corridor it planned 1,600 m six times in nine seconds, 30 s each."""
+        calls: list[str] = []
+        context = SimpleNamespace(
+            plan=SimpleNamespace(takes_long=True),
+            yielding=SimpleNamespace(forget=lambda: None),
+            journal=SimpleNamespace(count=calls.append),
+            is_sure=lambda belief: sure,  # noqa: ARG005
+            replans=0,
+        )
+        monkeypatch.setattr(states, "plan", lambda *_: Ended())
+        belief = Belief(Pose2(1.0, 1.0, 0.0), np.eye(3))
+        state = states.go_astray(cast(Context, context), 7.0, belief)
+        assert isinstance(state, Ended if sure else states.LookingAround)
+        assert sure or (isinstance(state, states.LookingAround) and state.until_s == 7.0 + states.LOOK_S)
+        assert (calls, context.replans) == (["replans"], int(sure))
 
     @pytest.mark.parametrize("localizer", ["slam", "dead-reckoning"])
     def test_who_never_mends_its_start_is_told_so_before_it_sweeps(self, localizer: str) -> None:

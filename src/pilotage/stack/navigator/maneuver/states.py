@@ -284,10 +284,16 @@ def go_for_the_rest(context: Context, t_s: float, belief: Belief) -> Following |
 
 
 def go_astray(context: Context, t_s: float, belief: Belief) -> State:
-    """Plan anew; what a vague estimate's jumps ask for does not count against it."""
+    """Plan anew; what a vague estimate's jumps ask for does not count against it.
+
+    Nor does it plan at each of these what takes long: it looks around before.
+    """
     context.yielding.forget()
-    context.replans += context.is_sure(belief)
+    is_sure = context.is_sure(belief)
+    context.replans += is_sure
     if context.replans > MOST_REPLANS:
         return fail(context, t_s, "stuck: it cannot keep to its plans")
     context.journal.count("replans")
+    if context.plan.takes_long and not is_sure:
+        return LookingAround(context, t_s + LOOK_S)
     return plan(context, t_s, belief)
