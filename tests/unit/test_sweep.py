@@ -292,12 +292,17 @@ def test_the_least_of_what_was_left_is_left_for_good() -> None:
     assert (rest_of(sought, driven, 0.8, 1.0 - 0.99 * share / 2).must <= rest).all()
 
 
-@pytest.mark.parametrize("width_m", [1e-5, 1e5])
-def test_a_pass_that_the_maps_cells_tell_nothing_of_is_refused(width_m: float) -> None:
-    """One was divided by no area, with a warning; the other was told that its start stood in a wall."""
+@pytest.mark.parametrize(("width_m", "most_m2"), [(0.05, 62.5), (1e-5, 2.5e-6), (1e5, 0.0)])
+def test_a_pass_that_the_maps_cells_tell_nothing_of_is_refused(width_m: float, most_m2: float) -> None:
+    """One was divided by no area, with a warning; the other was told that its start stood in a wall.
+
+    Of 320 m x 236 m one was told to sweep 1.74 m wide, and not that a part of the map would do.
+    """
     world, _ = swept_floor("a room")
+    remedy = f"; of so narrow a pass cells tell of {most_m2:g} m² at most: take a part of the map"
+    remedy *= most_m2 > 0.0
     room = {"map": "room", "bounds_m": list(world.bounds_m), "walls_m": ROOM}
-    sweep = f"expected a width_m of 0.0566 to 8 for a map of 10 m x 8 m, found {width_m:g}"
+    sweep = f"expected a width_m of 0.0566 to 8 for a map of 10 m x 8 m, found {width_m:g}{remedy}$"
     changed = copy.deepcopy(MISSIONS["sweep-floor"])
     changed["world"] |= {"map": room, "start": {"x_m": 1.0, "y_m": 1.0}}
     changed["task"] = {"name": "sweep-floor", "width_m": width_m}
