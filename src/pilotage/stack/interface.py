@@ -38,6 +38,11 @@ class Belief:
         """Standard deviation of the position, in the direction in which it is known worst."""
         return math.sqrt(max(float(np.linalg.eigvalsh(self.cov[:2, :2])[-1]), 0.0))
 
+    @property
+    def least_std_m(self) -> float:
+        """The same in the direction in which it is known best."""
+        return math.sqrt(max(float(np.linalg.eigvalsh(self.cov[:2, :2])[0]), 0.0))
+
     @staticmethod
     def anywhere(bounds_m: tuple[float, float, float, float]) -> Belief:
         """Lost: mean and covariance of a pose spread evenly over a floor (xmin, ymin, xmax, ymax)."""

@@ -113,6 +113,7 @@ class GlobalPlan:
         self.circles_m: FloatArray = chart.barriers.circles_m
         self._looked_at: FloatArray | None = None
         self._trail: FloatArray | None = None
+        self._unsure_m = 0.0
 
     @property
     def clearance_m(self) -> float:
@@ -144,16 +145,17 @@ class GlobalPlan:
         detours: Detours = AS_FAR_AS_IT_TAKES,
         trail: FloatArray | None = None,
         rest: bool = False,
+        unsure_m: float = 0.0,
     ) -> PlanResult:
         """Plan on the map with what was found on it, at the first clearance that gives a path; adopt it.
 
         ``trail`` (N, 3) is what was driven of a path that covers something; where a ``rest`` of that is asked
         for and there is none, the path before stays. One of the later clearances is taken where it saves more
-        than the ``detours`` to which it leads. Returns the last result; its path is None where no clearance
-        gave one.
+        than the ``detours`` to which it leads. ``unsure_m`` is how well the start is known. Returns the last
+        result; its path is None where no clearance gave one.
         """
         begin = time.perf_counter()
-        self._looked_at, self._trail = mapped_m, trail
+        self._looked_at, self._trail, self._unsure_m = mapped_m, trail, unsure_m
         field = with_circles(self._chart.field, mapped_m)
         result, found = self._search(start, goal, field, mapped_m, clearances_m, detours)
         self.turns_first = False
@@ -269,7 +271,15 @@ class GlobalPlan:
     ) -> tuple[PlanResult, Path | None]:
         """Plan and smooth at one clearance."""
         request = PlanRequest(
-            start, goal, field, self._rng, clearance_m, *self._shape(), self._trail, self.beside_outline
+            start,
+            goal,
+            field,
+            self._rng,
+            clearance_m,
+            *self._shape(),
+            trail=self._trail,
+            beside_outline=self.beside_outline,
+            unsure_m=self._unsure_m,
         )
         result = self._planner.plan(request)
         self.too_tight, self.hopeless = False, False

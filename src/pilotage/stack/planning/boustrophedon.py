@@ -33,6 +33,10 @@ MOST_CELLS_ORDERED = 100_000
 LITTLE = 0.05
 """Share of the floor: where no more is to be swept, detours from the straight path may be shorter."""
 
+OVERLAP_STDS, MOST_OVERLAP = 1.5, 0.05
+"""Passes overlap by so many of the robot's standard deviations, by so much of their width at most: where a
+map tells no more than its cells both passes beside one another are off alike, but for a sixth of that."""
+
 BESIDE_M = 0.03
 """A body keeps so much beside itself where there is room: its lasers stop it a centimetre before what they
 show, which is some millimetres of noise nearer than it is, and nobody is on his path to the millimetre."""
@@ -44,7 +48,8 @@ class BoustrophedonConfig(Config):
     width_m: Positive = 0.5
     clearance_m: float = Field(default=0.3, ge=0.0, le=100.0)
     overlap_m: float = Field(default=0.012, ge=0.0)
-    """Of passes side by side: what is planned for stays swept where a robot drives half of it beside."""
+    """Of passes side by side, at least: what is planned for stays swept where a robot drives half of it
+    beside. Who is unsure of its place lays more (``OVERLAP_STDS``)."""
     enough: float = Field(default=0.99995, gt=0.0, le=1.0)
     """Share of the floor: the smallest pieces that were left are left for good, down to this."""
     waypoint_spacing_m: Positive = 1.5
@@ -92,7 +97,10 @@ class BoustrophedonPlanner(ConfiguredPlanner[BoustrophedonConfig]):
             return failure(status, why, time.perf_counter() - began)
         try:
             keeping = Keeping(radius_m, max(clearance_m, radius_m + BESIDE_M), start)
-            sought = whole_floor(request.field, keeping, width_m, self._config.overlap_m)
+            overlap_m = max(
+                self._config.overlap_m, min(OVERLAP_STDS * request.unsure_m, MOST_OVERLAP * width_m)
+            )
+            sought = whole_floor(request.field, keeping, width_m, overlap_m)
             if request.trail is not None:
                 sought = rest_of(sought, request.trail, width_m, self._config.enough)
             within_reach = sought.must | sought.may

@@ -90,6 +90,8 @@ class PlanRequest:
     trail
         (N, 3) x, y and the standard deviation to the side [m]: where the robot has been since it first asked,
         for planners of paths that cover something; None at first.
+    unsure_m
+        Standard deviation of the robot's place in the direction in which it is known best, for these too.
     """
 
     start: Pose2
@@ -101,6 +103,7 @@ class PlanRequest:
     least_turning_radius_m: float = 0.0
     trail: FloatArray | None = None
     beside_outline: bool = False
+    unsure_m: float = 0.0
 
 
 def _no_edges() -> FloatArray:

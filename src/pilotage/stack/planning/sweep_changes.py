@@ -14,7 +14,7 @@ from pilotage.maps.distance_field import DistanceField
 from pilotage.maps.floor import Floor
 from pilotage.stack.planning.sweep_floor import Sought
 
-TRIES_A_WIDTH, MOST_TRIES, BATCH, BATCHES = 700, 2_000_000, 20_000, 20
+TRIES_A_WIDTH, MOST_TRIES, BATCH, BATCHES = 700, 6_000_000, 20_000, 20
 """Changes that are tried to the path, for each width of its length, and at most; so many draws at once at
 most, and batches at least: prices rise from one to the next."""
 CHANGE_CELLS, MARGIN, MOST_CHANGE_CELLS = 20, 0.25, 12_000_000

@@ -18,8 +18,8 @@ from pilotage.stack.planning.sweep_room import CELLS, Keeping, path_floor
 STEP_M = 0.002
 """Stretches of a trail on which its radius differs by less are taken together, with the least of it."""
 
-OVERLAP_SHARE = 0.25
-"""Of the overlap: two such standard deviations are what passes overlap for to either side."""
+FORGIVEN = 4.0
+"""So many times as unsure as it mostly is is what a robot may be without its pass counting as narrower."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,10 +111,10 @@ def covered(floor: Floor, path: FloatArray, width_m: float) -> BoolArray:
 def surely_covered(floor: Floor, trail: FloatArray, width_m: float, overlap_m: float) -> BoolArray:
     """(rows, columns) cells whose middles a pass along a trail swept, as far as the robot knows.
 
-    Where it was more than twice as unsure of its place as it mostly was, as when it had just begun, the pass
-    counts as narrower: by two standard deviations to either side beyond that. To ask for more of all of a
-    sweep would be to ask for it again; passes overlap by what a robot mostly is beside where it believes,
-    however sure of the millimetre it mostly is.
+    Where it was more than four times as unsure of its place as it mostly was, as when it had just begun, the
+    pass counts as narrower: by two standard deviations to either side beyond that. To ask for more of all of
+    a sweep would be to ask for it again; and passes beside one another are mostly off alike, for the same
+    walls tell both. Half of what passes overlap is forgiven however sure of the millimetre a robot mostly is.
 
     Parameters
     ----------
@@ -125,8 +125,8 @@ def surely_covered(floor: Floor, trail: FloatArray, width_m: float, overlap_m: f
     if not len(trail):  # a sweep that ended before its first pass
         return found
     unsure_m = np.maximum(trail[:-1, 2], trail[1:, 2])
-    usual_m = max(float(np.median(trail[:, 2])), OVERLAP_SHARE * overlap_m)
-    radius_m = 0.5 * width_m - 2.0 * np.maximum(0.0, unsure_m - 2.0 * usual_m)
+    forgiven_m = max(FORGIVEN * float(np.median(trail[:, 2])), 0.5 * overlap_m)
+    radius_m = 0.5 * width_m - 2.0 * np.maximum(0.0, unsure_m - forgiven_m)
     steps = np.ceil(radius_m / STEP_M)
     for first, last in itertools.pairwise([0, *(np.flatnonzero(np.diff(steps)) + 1).tolist(), len(steps)]):
         if last > first and (radius := float(radius_m[first:last].min())) > 0.0:

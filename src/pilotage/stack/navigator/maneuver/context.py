@@ -107,45 +107,48 @@ class Context(Standing):
         """(2,) the nearest place of the map with room for the disc around it."""
         return self.own_map.told.field.nearest_clear(pose.as_array()[:2], self._robot.radius_m)
 
-    def planned(self, t_s: float, pose: Pose2, *, rest: bool = False) -> PlanResult:
-        """What was found from there, around what it found on its way, if it can."""
+    def planned(self, t_s: float, belief: Belief, *, rest: bool = False) -> PlanResult:
+        """What was found from where it is, around what it found on its way, if it can."""
         found, clearances_m = self.own_map.found_circles_m, self._clearances_m()
-        result = self._made(t_s, pose, found, clearances_m, rest=rest)
+        result = self._made(t_s, belief, found, clearances_m, rest=rest)
         if result.path is not None or rest or not len(found):
             return result
         # What it mapped may have gone by the time that it is there: it stops before what has not.
-        return self._made(t_s, pose, found[:0], clearances_m)
+        return self._made(t_s, belief, found[:0], clearances_m)
 
-    def planned_around(self, t_s: float, pose: Pose2) -> PlanResult:
-        """What was found from there around all that it sees, or not at all.
+    def planned_around(self, t_s: float, belief: Belief) -> PlanResult:
+        """What was found from where it is around all that it sees, or not at all.
 
         Around what it saw where it was held up, too, if it can: from one side of a thing it does not see the
         other.
         """
         seen_m = self.own_half.seen_m
         if len(self._held_by_m):
-            result = self._made_around(t_s, pose, np.vstack([self._held_by_m, seen_m]))
+            result = self._made_around(t_s, belief, np.vstack([self._held_by_m, seen_m]))
             if result.path is not None:
                 return result
-        return self._made_around(t_s, pose, seen_m)
+        return self._made_around(t_s, belief, seen_m)
 
-    def _made_around(self, t_s: float, pose: Pose2, seen_m: FloatArray) -> PlanResult:
+    def _made_around(self, t_s: float, belief: Belief, seen_m: FloatArray) -> PlanResult:
         cells = np.round(seen_m / SEEN_M).astype(np.int64)
         seen = seen_m[np.unique(cells, axis=0, return_index=True)[1]]
         found = np.vstack([self.own_map.found_circles_m, np.column_stack([seen, np.full(len(seen), SEEN_M)])])
         clearances_m = self._clearances_m()
         # Who can wait as well does not squeeze through where nothing is left beside its outline.
         some_m = [clearances_m[0], *clearances_m[1:-1][-1:]]
-        result = self._made(t_s, pose, found, some_m)
+        result = self._made(t_s, belief, found, some_m)
         if result.status is PlanStatus.START_BLOCKED:
-            result = self._made(t_s, pose, found, clearances_m)
+            result = self._made(t_s, belief, found, clearances_m)
         return result
 
     def _made(
-        self, t_s: float, pose: Pose2, found: FloatArray, clearances_m: list[float], *, rest: bool = False
+        self, t_s: float, belief: Belief, found: FloatArray, clearances_m: list[float], *, rest: bool = False
     ) -> PlanResult:
         trail = None if self.trail is None else self.trail.rows
-        return self.plan.make(t_s, pose, self._goal, found, clearances_m, trail=trail, rest=rest)
+        unsure_m = belief.least_std_m
+        return self.plan.make(
+            t_s, belief.pose, self._goal, found, clearances_m, trail=trail, rest=rest, unsure_m=unsure_m
+        )
 
     def _clearances_m(self) -> list[float]:
         """Clearances to try in turn: the planner's own, and less.

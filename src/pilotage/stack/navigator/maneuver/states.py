@@ -90,7 +90,7 @@ class Found:
         """Plan from there, or make for where a plan might begin."""
         context, t_s, found = self.context, readings.t_s, self
         if t_s >= self.plan_at_s:
-            result = context.planned(t_s, belief.pose)
+            result = context.planned(t_s, belief)
             if result.status is not PlanStatus.START_BLOCKED or self.tries == MOST_TRIES:
                 return set_out(context, t_s, belief, result).step(readings, belief)
             there = context.nearest_room_m(belief.pose)
@@ -152,7 +152,7 @@ def first_state(context: Context, belief: Belief) -> State:
 
 def plan(context: Context, t_s: float, belief: Belief) -> State:
     """Plan from where it believes to be, and lay out the path."""
-    return set_out(context, t_s, belief, context.planned(t_s, belief.pose))
+    return set_out(context, t_s, belief, context.planned(t_s, belief))
 
 
 def set_out(context: Context, t_s: float, belief: Belief, result: PlanResult) -> State:
@@ -245,7 +245,7 @@ def give_way(context: Context, state: Driving, t_s: float, belief: Belief, act: 
     """Having been held up for long: around what it sees, or back the way that it came."""
     context.held_up(math.inf if isinstance(state, BackingOut) else to_go_m)
     if context.holds.too_many:
-        around = context.planned_around(t_s, belief.pose)
+        around = context.planned_around(t_s, belief)
         found = "a path around leads no farther" if around.path is not None else around.reason
         return fail(context, t_s, f"stuck: something stands in its way: {found}")
     out: State | None = None
@@ -271,7 +271,7 @@ def back_out(
 
 def go_around(context: Context, t_s: float, belief: Belief) -> Following | None:
     """On a path around all that it sees, if there is one."""
-    result = context.planned_around(t_s, belief.pose)
+    result = context.planned_around(t_s, belief)
     path = context.plan.path
     if result.path is None or path is None:
         return None
@@ -302,9 +302,9 @@ def go_for_the_rest(context: Context, t_s: float, belief: Belief) -> Following |
     if context.trail is None or context.rests == MOST_RESTS:
         return None
     context.rests += 1
-    result = context.planned(t_s, belief.pose, rest=True)
+    result = context.planned(t_s, belief, rest=True)
     if not result.covers and context.own_map.forgets():
-        result = context.planned(t_s, belief.pose, rest=True)
+        result = context.planned(t_s, belief, rest=True)
     if result.path is None or not result.covers:
         return None
     context.lay_out(result.path, belief.pose.theta_rad)
@@ -313,10 +313,16 @@ def go_for_the_rest(context: Context, t_s: float, belief: Belief) -> Following |
 
 
 def go_astray(context: Context, t_s: float, belief: Belief) -> State:
-    """Plan anew; what a vague estimate's jumps ask for does not count against it."""
+    """Plan anew; what a vague estimate's jumps ask for does not count against it.
+
+    Nor does it plan at each of these what takes long: it looks around before.
+    """
     context.yielding.forget()
-    context.replans += context.is_sure(belief)
+    is_sure = context.is_sure(belief)
+    context.replans += is_sure
     if context.replans > MOST_REPLANS:
         return fail(context, t_s, "stuck: it cannot keep to its plans")
     context.journal.count("replans")
+    if context.plan.takes_long and not is_sure:
+        return LookingAround(context, t_s + LOOK_S)
     return plan(context, t_s, belief)
