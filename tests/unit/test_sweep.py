@@ -425,13 +425,19 @@ class TestTask:
             journal=SimpleNamespace(count=calls.append),
             is_sure=lambda belief: sure,  # noqa: ARG005
             replans=0,
+            jumps=0,
+            end=lambda *_: None,
         )
         monkeypatch.setattr(states, "plan", lambda *_: Ended())
         belief = Belief(Pose2(1.0, 1.0, 0.0), np.eye(3))
         state = states.go_astray(cast(Context, context), 7.0, belief)
         assert isinstance(state, Ended if sure else states.LookingAround)
         assert sure or (isinstance(state, states.LookingAround) and state.until_s == 7.0 + states.LOOK_S)
-        assert (calls, context.replans) == (["replans"], int(sure))
+        assert (calls, context.replans, context.jumps) == (["replans"], int(sure), int(not sure))
+        # Each takes half a minute: for ever is no answer.
+        context.jumps = states.MOST_TRIES
+        state = states.go_astray(cast(Context, context), 9.0, belief)
+        assert isinstance(state, Ended)
 
     @pytest.mark.parametrize("localizer", ["slam", "dead-reckoning"])
     def test_who_never_mends_its_start_is_told_so_before_it_sweeps(self, localizer: str) -> None:

@@ -52,8 +52,9 @@ class Context(Standing):
         back to where it was.
     trail
         Where it has been, on a path that covers a floor.
-    replans, rests
-        How often it went astray though it knew its place, and set out for what was left.
+    replans, jumps, rests
+        How often it went astray though it knew its place, and as its estimate jumped, and set out for what
+        was left.
     has_planned
         Whether it has tried to, ever.
     """
@@ -90,7 +91,7 @@ class Context(Standing):
         self.step_clear = StepClear(robot, self.last_word)
         self.wandering = Wandering(config.wander, robot, localizer_of(parts, "maneuver"), self.last_word)
         self.trail: Trail | None = None
-        self.replans, self.rests, self.has_planned = 0, 0, False
+        self.replans, self.jumps, self.rests, self.has_planned = 0, 0, 0, False
         self._to_walls_m, self._held_by_m = 0.0, np.zeros((0, 2))
 
     def begin_anew(self) -> None:

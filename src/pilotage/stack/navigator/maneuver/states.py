@@ -23,7 +23,8 @@ LOOK_S = 2.0
 """A robot that believes to stand in a wall looks around for so long before it plans anew: once, or until it
 knows its place. So does who plans a path that it would not plan again for what its first readings correct."""
 MOST_TRIES, PLAN_AGAIN_S = 30, 1.0
-"""Who found itself where no plan begins plans so often, this long apart, on its way to where one might."""
+"""Who found itself where no plan begins plans so often, this long apart, on its way to where one might; so
+often plans what takes long who is astray and does not know its place well."""
 DOUBT_S = 10.0
 """Who is lost stands for so long, and drives about then."""
 AROUND, BACKING = 0.6, 0.2
@@ -315,14 +316,16 @@ def go_for_the_rest(context: Context, t_s: float, belief: Belief) -> Following |
 def go_astray(context: Context, t_s: float, belief: Belief) -> State:
     """Plan anew; what a vague estimate's jumps ask for does not count against it.
 
-    Nor does it plan at each of these what takes long: it looks around before.
+    Nor does it plan at each of these what takes long: it looks around before, and gives up after many.
     """
     context.yielding.forget()
     is_sure = context.is_sure(belief)
     context.replans += is_sure
-    if context.replans > MOST_REPLANS:
+    context.jumps += not is_sure
+    takes_long = context.plan.takes_long
+    if context.replans > MOST_REPLANS or (takes_long and context.jumps > MOST_TRIES):
         return fail(context, t_s, "stuck: it cannot keep to its plans")
     context.journal.count("replans")
-    if context.plan.takes_long and not is_sure:
+    if takes_long and not is_sure:
         return LookingAround(context, t_s + LOOK_S)
     return plan(context, t_s, belief)
