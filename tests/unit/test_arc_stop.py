@@ -254,6 +254,16 @@ def test_weak_brakes_slow_down_before_a_wall_rather_than_plan_anew(tmp_path: Pat
     assert (metrics["replans"], metrics["escapes"]) == (0, 0)
 
 
+def test_who_drives_ahead_and_aside_at_once_is_as_fast_as_it_is_told() -> None:
+    """Each of its speeds has its own limit: together they are faster than either."""
+    motion = OmnidirectionalConfig(**WEAK)
+    arc_stop = arc_stop_of(replace(told_of().robot, motion=motion, sensors=ODOMETRY, dt_s=DT_S))
+    arc_stop.take_in(Readings(0.0, {}))
+    arc_stop.take_in(Readings(DT_S, {"odometry": OdometryIncrement(0.1, 0.0, 0.1)}))
+    rolls_on = arc_stop.follows(STOP)
+    assert (rolls_on.v_m_s, rolls_on.lateral_m_s) == pytest.approx((0.96, 0.96))
+
+
 def test_what_comes_late_and_at_once_is_no_speed() -> None:
     """At 0.8 m/s it was taken for 1.6 m/s fast, and refused to turn where there was room for that."""
     sheet = replace(told_of().robot, motion=DifferentialDriveConfig(**WEAK), sensors=ODOMETRY, dt_s=DT_S)

@@ -26,8 +26,9 @@ class ArcStop:
     speed of the braking, and turn rate and lateral speed in proportion: a twist times a number has the same
     radius. It reckons that rates follow what it was told as fast as its data sheet, or its ``brakes`` as they
     have proved, let them, which is what they will do when a command acts, ``delay_s`` later; where its
-    odometry tells that they do not, as against a wall, those that it tells. Robots that steer wheels, which
-    stay where they are in a stop, and those that stop within a step are told (0, 0).
+    odometry tells that they do not, as against a wall, those that it tells, but none faster than it can be:
+    a reading that comes late comes together with the next. Robots that steer wheels, which stay where they
+    are in a stop, and those that stop within a step are told (0, 0).
     """
 
     def __init__(self, robot: RobotKnowledge, brakes: Brakes) -> None:
@@ -38,6 +39,7 @@ class ArcStop:
         self._steers = motion.least_turning_radius_m > 0.0
         self._turns_rad_s = motion.turn_acceleration_rad_s2 * robot.dt_s
         self._top_m_s, self._top_rad_s = motion.top_speed_m_s, motion.top_turn_rate_rad_s
+        self._fastest_m_s = math.hypot(motion.top_speed_m_s, motion.top_lateral_m_s)
         self._may_differ_m_s = (STEPS + motion.delay_s / robot.dt_s) * self._slows_m_s
         self._odometry = odometry_of_every_step(robot)
         self._going, self._per_m = STOP, 0.0
@@ -64,7 +66,7 @@ class ArcStop:
         distance_var, _ = increment_variances(driven_m, told.angle_rad, *sheet.densities)
         noise_m_s = STDS * math.sqrt(distance_var) / dt_s
         if math.hypot(along_m_s, across_m_s) > self._may_differ_m_s + noise_m_s:
-            over_s = max(dt_s, driven_m / self._top_m_s)
+            over_s = max(dt_s, driven_m / self._fastest_m_s)
             self._going = Twist(told.distance_m / over_s, told.angle_rad / over_s, told.lateral_m / over_s)
 
     def sent(self, command: Twist) -> None:
