@@ -218,3 +218,30 @@ def test_before_what_stands_it_gets_around_or_gives_up_and_says_why(taken: str, 
     if not arrives:
         assert str(metrics["reason"]).startswith("stuck: something stands in its way: the goal (6, 1.5) is")
         assert float(str(metrics["duration_s"])) < 250.0
+
+
+@pytest.mark.parametrize("sure", [False, True])
+def test_a_vague_estimates_jumps_do_not_each_ask_for_a_sweep(
+    monkeypatch: pytest.MonkeyPatch, sure: bool
+) -> None:
+    """Metres off along a corridor it planned 1,600 m six times in nine seconds, 30 s each."""
+    calls: list[str] = []
+    context = SimpleNamespace(
+        plan=SimpleNamespace(takes_long=True),
+        yielding=SimpleNamespace(forget=lambda: None),
+        journal=SimpleNamespace(count=calls.append),
+        is_sure=lambda belief: sure,  # noqa: ARG005
+        replans=0,
+        jumps=0,
+        end=lambda *_: None,
+    )
+    monkeypatch.setattr(states, "plan", lambda *_: Ended())
+    belief = Belief(Pose2(1.0, 1.0, 0.0), np.eye(3))
+    state = states.go_astray(cast(Context, context), 7.0, belief)
+    assert isinstance(state, Ended if sure else states.LookingAround)
+    assert sure or (isinstance(state, states.LookingAround) and state.until_s == 7.0 + states.LOOK_S)
+    assert (calls, context.replans, context.jumps) == (["replans"], int(sure), int(not sure))
+    # Each takes half a minute: for ever is no answer.
+    context.jumps = states.MOST_TRIES
+    state = states.go_astray(cast(Context, context), 9.0, belief)
+    assert isinstance(state, Ended)

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pilotage.kernels.patrol.rounds import BACK, judge_walk, plan_cost
-from pilotage.stack.patrol.forecast import Driving, forecast_m
+from pilotage.stack.patrol.forecast import forecast_m
 from pilotage.stack.patrol.graph import PatrolGraph
 from pilotage.stack.patrol.partition import Plan, annealed, even_sizes, partition
 from pilotage.stack.patrol.passages import Passages
@@ -19,6 +19,7 @@ from pilotage.stack.patrol.shut_paths import NONE_SHUT, OpenGraph, ShutPaths
 from pilotage.stack.patrol.strategies.adaptive_rounds import (
     AdaptiveRoundsConfig,
     best_plan,
+    driving_of,
 )
 from pilotage.stack.patrol.tours import Round
 from support.patrol_teams import ring, setting_for
@@ -119,16 +120,7 @@ def test_no_plan_is_above_a_share_for_each_robot(seed: int) -> None:
     """One round for all eight was taken for its worst; its mean was 5 and 8 % above that of shares."""
     graph = random_graph(seed)
     setting, config = setting_for(graph, tuple(range(8))), AdaptiveRoundsConfig()
-    driving = Driving(
-        visit_m=setting.visit_m,
-        turn_m=setting.turn_m,
-        meeting_m=config.meeting_m,
-        leg_spread_m=config.leg_spread_m,
-        slack=config.slack,
-        most_slack=config.most_slack,
-        beside_m=config.beside_passage_m,
-        talks=setting.talks,
-    )
+    driving = driving_of(setting, config)
     plans = best_plan(setting, [1.0] * 8, config), partition(graph, (1,) * 8)
     ours, alone = (np.array(forecast_m(plan, graph, setting.passages, driving)) for plan in plans)
     assert (ours <= 1.01 * alone).all()

@@ -57,11 +57,13 @@ def check_pass_width(bounds_m: tuple[float, float, float, float], width_m: float
     xmin, ymin, xmax, ymax = bounds_m
     least_m, most_m = CELLS_A_PASS * cell_side_m(bounds_m, 0.0), min(xmax - xmin, ymax - ymin)
     if not least_m <= width_m <= most_m:
-        most_m2 = MOST_CELLS * (width_m / CELLS_A_PASS) ** 2
-        part = f"; of so narrow a pass cells tell of {most_m2:.4g} m² at most: take a part of the map"
+        part = ""
+        if width_m < least_m:
+            most_m2 = MOST_CELLS * (width_m / CELLS_A_PASS) ** 2
+            part = f"; of so narrow a pass cells tell of {most_m2:.4g} m² at most: take a part of the map"
         raise InputError(
             f"{where}: expected a width_m of {least_m:.3g} to {most_m:.3g} for a map of {xmax - xmin:g} m x "
-            f"{ymax - ymin:g} m, found {width_m:g}" + part * (width_m < least_m)
+            f"{ymax - ymin:g} m, found {width_m:g}{part}"
         )
 
 

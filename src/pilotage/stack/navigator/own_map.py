@@ -76,6 +76,10 @@ class OwnMap:
             self._circles = read_only(np.concatenate([self.known_circles_m, found]))
         return self._circles
 
+    def nearest_room_m(self, pose: Pose2, clearance_m: float) -> FloatArray | None:
+        """(2,) the nearest place of the told map that keeps a clearance; None where none does."""
+        return self.told.field.nearest_clear(pose.as_array()[:2], clearance_m)
+
     def distance_m(self, pose: Pose2) -> float:
         """Distance from the pose's point to the nearest thing that is not driven into."""
         return plane.distance_to_nearest(pose.x_m, pose.y_m, self.barriers.segments_m, self.circles_m)

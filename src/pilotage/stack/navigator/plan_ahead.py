@@ -138,9 +138,7 @@ class PlanAhead:
             return
         if self._status is PlanStatus.START_BLOCKED and self._tries_left > 0:
             self._tries_left -= 1
-            self._room_m = self._own_map.told.field.nearest_clear(
-                belief.pose.as_array()[:2], self._plan.clearance_m
-            )
+            self._room_m = self._own_map.nearest_room_m(belief.pose, self._plan.clearance_m)
             return
         self.failure = f"no plan leads to the goal: {self._why}"
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from pilotage.core.angles import wrap_to_pi
-from pilotage.core.types import FloatArray, Goal, Pose2, Twist
+from pilotage.core.types import Goal, Pose2, Twist
 from pilotage.kernels.geometry import plane
 from pilotage.sensors.readings import Readings
 from pilotage.stack.control.controller import Controller
@@ -281,10 +281,6 @@ class Context(Standing):
         own = self.plan.clearance_m
         fallbacks = (self.radius_m + margin for margin in self.config.fallback_margins_m)
         return [own, *(clearance for clearance in fallbacks if clearance <= own)]
-
-    def nearest_room_m(self, pose: Pose2) -> FloatArray | None:
-        """(2,) the nearest place of the map from which the planner would plan with its own clearance."""
-        return self.own_map.told.field.nearest_clear(pose.as_array()[:2], self.plan.clearance_m)
 
     def _to_walls_m(self, pose: Pose2) -> float:
         """Distance to what the robot was told of."""

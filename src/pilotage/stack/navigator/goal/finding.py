@@ -76,7 +76,9 @@ class Found:
             if counts["replans"] >= context.config.max_replans:
                 return fail(context, f"stuck: found itself, but {result.status} ({result.reason})")
             context.wandering.plan_at_s = context.t_s + PLAN_AGAIN_S
-            there = context.nearest_room_m(pose) if result.status is PlanStatus.START_BLOCKED else None
+            there = None
+            if result.status is PlanStatus.START_BLOCKED:
+                there = context.own_map.nearest_room_m(pose, context.plan.clearance_m)
             return Move(replace(self, towards_m=there), context.wandering.make_for(there, pose, readings))
         context.trail = []
         if context.reactive is not None:

@@ -73,7 +73,7 @@ class Context(Standing):
         super().__init__(journal)
         self._channel = journal.channel(COLUMNS, first=True)
         self.config, self._robot, self._goal = config, robot, goal
-        self.dt_s = robot.dt_s
+        self.dt_s, self.radius_m = robot.dt_s, robot.radius_m
         self._mapper, self._has_mates = parts.mapper, task.mates > 0
         self.own_map = OwnMap(chart, parts.mapper)
         car = car_of(robot.footprint, WALL_M, 1.0)
@@ -103,10 +103,6 @@ class Context(Standing):
     def is_sure(self, belief: Belief) -> bool:
         """Whether a place that it should not be at is where it is, not what its estimate jumped to."""
         return belief.std_m < SURE * self.config.astray_m
-
-    def nearest_room_m(self, pose: Pose2) -> FloatArray | None:
-        """(2,) the nearest place of the map with room for the disc around it."""
-        return self.own_map.told.field.nearest_clear(pose.as_array()[:2], self._robot.radius_m)
 
     def planned(self, t_s: float, belief: Belief, *, rest: bool = False) -> PlanResult:
         """What was found from where it is, around what it found on its way, if it can."""

@@ -94,7 +94,7 @@ class Found:
             result = context.planned(t_s, belief)
             if result.status is not PlanStatus.START_BLOCKED or self.tries == MOST_TRIES:
                 return set_out(context, t_s, belief, result).step(readings, belief)
-            there = context.nearest_room_m(belief.pose)
+            there = context.own_map.nearest_room_m(belief.pose, context.radius_m)
             found = Found(context, there, t_s + PLAN_AGAIN_S, self.tries + 1)
         context.look(readings, belief)
         return Move(found, context.wandering.make_for(found.towards_m, belief.pose, readings))

@@ -69,6 +69,20 @@ class AdaptiveRoundsConfig(Config):
     """Who surely is in reach is given up sooner: as soon as so long a silence by chance is less probable."""
 
 
+def driving_of(setting: PatrolSetting, config: AdaptiveRoundsConfig) -> Driving:
+    """How the team drives, for forecasts of its plans."""
+    return Driving(
+        visit_m=setting.visit_m,
+        turn_m=setting.turn_m,
+        meeting_m=config.meeting_m,
+        leg_spread_m=config.leg_spread_m,
+        slack=config.slack,
+        most_slack=config.most_slack,
+        beside_m=config.beside_passage_m,
+        talks=setting.talks,
+    )
+
+
 def best_plan(setting: PatrolSetting, paces: Sequence[float], config: AdaptiveRoundsConfig) -> Plan:
     """The plan for robots of paces (N,) that is forecast to be best: one round for all, for each, or between.
 
@@ -86,16 +100,7 @@ def best_plan(setting: PatrolSetting, paces: Sequence[float], config: AdaptiveRo
         for sizes, slowest in sorted(groupings(paces, groups), reverse=True)
         for turn_m in sorted({0.0, setting.turn_m})
     ]
-    driving = Driving(
-        visit_m=setting.visit_m,
-        turn_m=setting.turn_m,
-        meeting_m=config.meeting_m,
-        leg_spread_m=config.leg_spread_m,
-        slack=config.slack,
-        most_slack=config.most_slack,
-        beside_m=config.beside_passage_m,
-        talks=setting.talks,
-    )
+    driving = driving_of(setting, config)
 
     def forecast(plan: Plan) -> tuple[float, float]:
         return forecast_m(plan, graph, setting.passages, driving)
