@@ -10,7 +10,7 @@ import numpy as np
 import scipy
 from pydantic import Field, model_validator
 
-from pilotage.core.angles import wrap_array_to_pi, wrap_to_pi
+from pilotage.core.angles import wrap_array_to_pi
 from pilotage.core.config import Config
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, Pose2
@@ -39,23 +39,17 @@ from pilotage.stack.localization.odometry_watch import (
 )
 from pilotage.stack.localization.relocalization import STDS, Relocalization
 from pilotage.stack.localization.same_witness import SameWitness
-from pilotage.stack.localization.self_check import LEAST_SEEN, ExplainedShare, SelfCheck
+from pilotage.stack.localization.scan_judge import ScanJudge
+from pilotage.stack.localization.self_check import LEAST_SEEN
 from pilotage.stack.localization.walls_between import WallsBetween
 
 NAME = "particle-filter"
 COLUMNS = {"particles": "1", "effective_particles": "1", "scan_parts": "1", "localized": "1"}
 """Size of the cloud, how much of it was effective, how many parts the scan was let in by, and whether the
 robot holds itself for localized."""
-POSE_DOF = 3.0
-MOST_BESIDE = 0.25
-"""A belief of which a larger share of beams end beside one is wrong."""
-LEAST_AT_WALL, UNEXPLAINED_SCANS = 0.15, 10
-"""A crowd may hide the walls for a while; more scans that show fewer of them speak against the belief."""
 MOST_ALIKE = 5
 """So many scans on walls count where the robot stands: what is on no map, and what the map is wrong by, is
 the same in all of them."""
-UNSURE_M = 0.1
-"""A cloud wider than this (standard deviation) may settle at another place that looks alike."""
 FLOOR = np.diag([1e-12, 1e-12, 1e-12])
 """Added to the particles' covariance, which is singular where the start is exact and nothing has moved."""
 
@@ -148,12 +142,10 @@ class ParticleFilterLocalizer:
             odometry, config.odometry, config.odometry_var_scale, config.odometry_model
         )
         self._motion = GyroOdometry(robot, self._odometry, self._prediction, journal)
-        self._watch, self._check = OdometryWatch(robot, odometry), SelfCheck(refused_share=MOST_BESIDE)
+        self._watch = OdometryWatch(robot, odometry)
         self._doubt, self._witness = OdometryDoubt(), SameWitness()
         self._blind = bool(initial.cov[2, 2] > LINEAR_RAD**2)
-        self._unexplained, self._found = 0, True
         self._moved, self._alike = (0.0, 0.0), 0
-        self._explained, self._sharp = ExplainedShare(), ExplainedShare()
         range_var_m2 = lidar.range_var_m2 if config.range_var_m2 is None else config.range_var_m2
         self._field = LikelihoodField(
             chart,
@@ -169,6 +161,8 @@ class ParticleFilterLocalizer:
         self._relocalization = (
             Relocalization(self._field, chart.bounds_m, told) if config.relocalize else None
         )
+        self._judge = ScanJudge(self._field, self._relocalization, self._doubt)
+        self._check = self._judge.check
         self._picked = np.unique(np.linspace(0, lidar.beams - 1, min(config.beams, lidar.beams)).astype(int))
         angles = lidar.beam_angles_rad()[self._picked] + lidar.mount.theta_rad
         self._directions = np.column_stack([np.cos(angles), np.sin(angles)])
@@ -208,7 +202,8 @@ class ParticleFilterLocalizer:
                 moments = self._weigh(points, prior[1]) if weighs else None
                 if moments is not None:
                     self._doubt.tell(t_s, prior, moments[0], *moved)
-                self._judge(prior, prior[0] if moments is None else moments[0], points, t_s)
+                mean = prior[0] if moments is None else moments[0]
+                self._judge.tell(t_s, prior, mean, points, len(self._picked))
             elif self._check.lost(t_s) and len(seen) >= LEAST_SEEN:
                 self._check.alarm(t_s)  # what says nothing does not find it
         if moments is None:
@@ -347,49 +342,6 @@ class ParticleFilterLocalizer:
         seen = ranges < self._max_range  # neither beyond reach nor NaN
         points: FloatArray = self._mount_xy + ranges[seen, None] * self._directions[seen]
         return points
-
-    def _judge(
-        self, prior: tuple[FloatArray, FloatArray], mean: FloatArray, points: FloatArray, t_s: float
-    ) -> None:
-        """Hold the scan against the belief before it, and beam by beam against the one after it.
-
-        The step from the one mean to the other is at most as large as the first was uncertain. A beam that
-        ends far from any wall may have hit what is on no map; many that end beside one, not at it, say that
-        the pose is off, and so does a scan of which next to nothing is at a wall. Where the cloud was wide or
-        the robot lost, it may have settled at a place that only looks alike: it is believed again when the
-        scans fit as well as they used to; and so it is where more beams than usual end beside a wall.
-        """
-        beams = self._field.log_densities(points, mean)
-        at_wall = int((beams >= self._field.least_at_wall).sum())
-        beside = int((beams > self._field.least_beside).sum())
-        step = mean - prior[0]
-        step[2] = wrap_to_pi(float(step[2]))
-        self._check.tell(t_s, beside, at_wall, float(step @ np.linalg.solve(prior[1], step)), POSE_DOF)
-        if len(points) >= LEAST_SEEN:
-            self._unexplained = self._unexplained + 1 if at_wall < LEAST_AT_WALL * len(points) else 0
-        if self._unexplained >= UNEXPLAINED_SCANS:
-            self._check.alarm(t_s)
-        share, weight = at_wall / len(points), len(points) / len(self._picked)
-        again = self._relocalization
-        passed = None if again is None else again.passed(share, weight, self._explained.usual)
-        if passed and self._check.begin_anew(t_s):
-            self._found = True
-            self._explained.begin_anew()
-            self._sharp.begin_anew()
-        elif passed is False:
-            self._check.alarm(t_s)
-        if self._check.lost(t_s) or prior[1][0, 0] + prior[1][1, 1] > UNSURE_M**2:
-            self._found = False
-        as_usual = self._explained.tell(share, self._found, weight)
-        if self._doubt.judge(t_s, as_usual):
-            self._check.alarm(t_s)
-        if as_usual:
-            self._found = True
-        elif not self._found:
-            self._check.alarm(t_s)
-        # Crowds do not change which share of what ends about a wall ends at it; a wrong pose does.
-        if beside and not self._sharp.tell(at_wall / beside, self._found, beside / len(self._picked)):
-            self._check.alarm(t_s)
 
     def _resample(self, weights: FloatArray, mean: FloatArray, cov: FloatArray) -> None:
         config = self._config
