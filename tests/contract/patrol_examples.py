@@ -28,6 +28,7 @@ STRATEGY_NUMBERS: dict[str, frozenset[str]] = {
             "most_slack",
             "sharing_cost",
             "forecast_mean_weight",
+            "alike",
             "forecast_sharing_cost",
             "slack",
         }

@@ -12,9 +12,9 @@ from pilotage.experiments.mission import mission_of, read_mission
 from pilotage.maps.floor import Floor
 from pilotage.stack.patrol.graph import PatrolGraph
 from pilotage.stack.patrol.passages import Passages
+from pilotage.stack.patrol.plan_choice import PlanChoice, best_plan
 from pilotage.stack.patrol.roadmap import Roadmap
 from pilotage.stack.patrol.shut_paths import OpenGraph, ShutPaths
-from pilotage.stack.patrol.strategies.adaptive_rounds import AdaptiveRoundsConfig, best_plan
 from pilotage.stack.patrol.strategy import PatrolSetting
 from pilotage.stack.patrol.task import PatrolSite
 from support.patrol_floors import on_floor, row, walled, with_corridor, with_door
@@ -135,9 +135,9 @@ def test_in_rooms_robots_go_round_one_way() -> None:
     """A tour comes through each door once. Shares are to and fro: half turns, at 1.4 times the bound."""
     setting = planned(4, 3, 8)
     assert setting.passages.pieces > 10
-    assert best_plan(setting, [1.0] * 8, AdaptiveRoundsConfig()).sizes == (8,)
+    assert best_plan(setting, [1.0] * 8, PlanChoice()).sizes == (8,)
     # Who is too near behind another watches it, and is held up.
-    roomy = best_plan(setting, [1.0] * 8, AdaptiveRoundsConfig(headway_m=12.0))
+    roomy = best_plan(setting, [1.0] * 8, PlanChoice(headway_m=12.0))
     assert len(roomy.sizes) > 1
     assert all(n == 1 or walk.length_m > 12.0 * n for walk, n in zip(roomy.rounds, roomy.sizes, strict=True))
 
@@ -165,7 +165,7 @@ def test_what_turning_back_costs_is_what_the_slowest_says(
 def test_more_robots_than_places_stand_at_them() -> None:
     graph, _ = row(walled(14, 5), (1.0, 2.5), (7.0, 2.5), (13.0, 2.5))
     setting = PatrolSetting(graph, 0, np.arange(8) % 3, 1.0, np.random.default_rng(0))
-    plan = best_plan(setting, [1.0] * 8, AdaptiveRoundsConfig())
+    plan = best_plan(setting, [1.0] * 8, PlanChoice())
     assert plan.worst_m == 0.0
     assert sorted(plan.sizes) == [2, 3, 3]
 

@@ -12,7 +12,8 @@ from benchmarks.patrol import random_graph
 from pilotage.stack.patrol.graph import PatrolGraph
 from pilotage.stack.patrol.messages import PatrolMemory
 from pilotage.stack.patrol.partition import annealed, even_sizes, groupings, partition
-from pilotage.stack.patrol.strategies.adaptive_rounds import AdaptiveRoundsConfig, _key, best_plan
+from pilotage.stack.patrol.plan_choice import PlanChoice, best_plan
+from pilotage.stack.patrol.strategies.adaptive_rounds import _key
 from support.patrol_teams import SPEED_M_S, builder, ring, setting_for
 
 
@@ -50,8 +51,8 @@ def test_a_slow_one_is_not_let_into_the_round_of_the_fast() -> None:
     """On a ring two that are alike go all round it; a slow one would make the fast one as slow."""
     graph = ring(12)
     setting = setting_for(graph, (0, 6))
-    assert best_plan(setting, [1.0, 1.0], AdaptiveRoundsConfig()).sizes == (2,)
-    assert best_plan(setting, [1.0, 0.3], AdaptiveRoundsConfig()).sizes == (1, 1)
+    assert best_plan(setting, [1.0, 1.0], PlanChoice()).sizes == (2,)
+    assert best_plan(setting, [1.0, 0.3], PlanChoice()).sizes == (1, 1)
 
 
 @pytest.mark.parametrize("starts", [(0, 11), (11, 0), (5, 5)])

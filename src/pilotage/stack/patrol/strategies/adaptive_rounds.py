@@ -4,46 +4,30 @@ from __future__ import annotations
 
 import math
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
-from operator import itemgetter
 
 import numpy as np
 import scipy
 from pydantic import Field
 
-from pilotage.core.config import Config
 from pilotage.core.types import FloatArray, IntArray
-from pilotage.sensors.sensor import NonNegative, Positive
-from pilotage.stack.patrol.forecast import Driving, forecast_m
+from pilotage.sensors.sensor import Positive
 from pilotage.stack.patrol.hearing import Hearing, Patience
 from pilotage.stack.patrol.leg_times import LegTimes
 from pilotage.stack.patrol.looking import Looking
 from pilotage.stack.patrol.messages import NOTHING, PatrolKnowledge, PatrolState
-from pilotage.stack.patrol.partition import Plan, annealed, groupings, partition
+from pilotage.stack.patrol.plan_choice import PlanChoice, best_plan
 from pilotage.stack.patrol.shut_paths import NONE_SHUT, OpenGraph, same_side
 from pilotage.stack.patrol.strategy import STRATEGIES, PatrolSetting
 from pilotage.stack.patrol.tours import Round, spread
 
-SAME = 0.01
-"""Of a forecast, which may be so much above another by chance."""
 KEY, PHASE_M, PHASE_S, GONE = range(4)
 """What a robot says: which round it goes, how far along it was, when, and whom it looked for in vain."""
 
 
-class AdaptiveRoundsConfig(Config):
-    """How plans are weighed, and when a robot waits or gives another one up.
-
-    Rounds are looked for whose worst idleness plus each of ``mean_weights`` times their mean is little; the
-    worst of one that several robots share counts ``sharing_cost`` more there and its mean half of that. Of
-    the plans found the one is taken whose forecast is best: its worst plus ``forecast_mean_weight`` times its
-    mean, ``forecast_sharing_cost`` of that more where robots share a round, for what it does not know. One
-    whose worst or mean is forecast to be above that of a share for each robot (MSP) is taken only where there
-    is no other, and of those that are about as good the one whose mean is least. In a forecast legs
-    take up to half of ``leg_spread_m`` more or less, and two who come near each other lose ``meeting_m`` of
-    driving on average where they have just room abreast: most pass at once, now and then they stand in each
-    other's way for long. A round on which robots are nearer to each other than ``headway_m``, who watch and
-    avoid each other all the time, is taken only where there is no other.
+class AdaptiveRoundsConfig(PlanChoice):
+    """How plans are chosen (``PlanChoice``), when a robot waits and when it gives another one up.
 
     A robot waits while it is further ahead of its place among those that share its round than ``slack`` of a
     mean leg between stops, within which nobody knows where the others are, or ``most_slack`` of the time
@@ -51,84 +35,12 @@ class AdaptiveRoundsConfig(Config):
     it, it never waits: those who are late would have to come by.
     """
 
-    mean_weights: tuple[NonNegative, ...] = Field(default=(0.5, 2.0), min_length=1)
-    sharing_cost: NonNegative = 0.06
-    forecast_mean_weight: NonNegative = 0.5
-    forecast_sharing_cost: NonNegative = 0.03
-    leg_spread_m: NonNegative = 0.7
-    meeting_m: NonNegative = 0.5
-    headway_m: NonNegative = 6.0
-    slack: Positive = 0.5
-    most_slack: Positive = Field(default=0.1, le=0.5)
-    beside_passage_m: NonNegative = 0.5
     silent_s: Positive = 30.0
     silent_ratio: Positive = 8.0
     """A robot is given up when its last word is so old, and so many times as old as it usually is; one that
     says that it is off duty when it has been for ``silent_s``: who lost its way is often back in seconds."""
     by_chance: Positive = Field(default=1e-8, lt=1.0)
     """Who surely is in reach is given up sooner: as soon as so long a silence by chance is less probable."""
-
-
-def driving_of(setting: PatrolSetting, config: AdaptiveRoundsConfig) -> Driving:
-    """How the team drives, for forecasts of its plans."""
-    return Driving(
-        visit_m=setting.visit_m,
-        turn_m=setting.turn_m,
-        meeting_m=config.meeting_m,
-        leg_spread_m=config.leg_spread_m,
-        slack=config.slack,
-        most_slack=config.most_slack,
-        beside_m=config.beside_passage_m,
-        talks=setting.talks,
-    )
-
-
-def best_plan(setting: PatrolSetting, paces: Sequence[float], config: AdaptiveRoundsConfig) -> Plan:
-    """The plan for robots of paces (N,) that is forecast to be best: one round for all, for each, or between.
-
-    Of every number of rounds those that are shortest, and those that turn back least for that.
-    """
-    graph, robots = setting.graph, len(paces)
-    most = min(robots, len(graph))
-    # What lies between is much alike: a few numbers of groups stand for all.
-    numbers = {1, 2, 3, robots // 2, robots - 1, robots, most}
-    plans = [
-        annealed(graph, sizes, weight, config.sharing_cost, turn_m, slowest)
-        for weight in sorted(set(config.mean_weights))
-        for groups in sorted(numbers)
-        if 1 <= groups <= most
-        for sizes, slowest in sorted(groupings(paces, groups), reverse=True)
-        for turn_m in sorted({0.0, setting.turn_m})
-    ]
-    driving = driving_of(setting, config)
-
-    def forecast(plan: Plan) -> tuple[float, float]:
-        return forecast_m(plan, graph, setting.passages, driving)
-
-    alone = [partition(graph, sizes, slowest) for sizes, slowest in groupings(paces, most)]
-    most_m = np.min([forecast(plan) for plan in alone], axis=0) * (1.0 + SAME)
-
-    def judged(plan: Plan) -> tuple[tuple[bool, bool], float, float]:
-        """Why it is taken only where there is no other, its cost, and its mean."""
-        worst_m, mean_m = forecast(plan)
-        sharing = config.forecast_sharing_cost if max(plan.sizes) > 1 else 0.0
-        together = zip(plan.rounds, plan.sizes, strict=True)
-        is_crowded = any(
-            size > 1 and 0.0 < walk.length_m < size * config.headway_m for walk, size in together
-        )
-        is_above = worst_m > most_m[0] or mean_m > most_m[1]
-        cost_m = (1.0 + sharing) * (worst_m + config.forecast_mean_weight * mean_m)
-        return (is_crowded, is_above), cost_m, mean_m
-
-    looked_at = [(*judged(plan), plan) for plan in [*plans, *alone]]
-    kind, least_m = min(judgement[:2] for judgement in looked_at)
-    # The worst is a matter of luck more than the mean is.
-    best = [
-        (mean_m, plan)
-        for k, cost_m, mean_m, plan in looked_at
-        if k == kind and cost_m <= least_m * (1.0 + SAME)
-    ]
-    return min(best, key=itemgetter(0))[1]
 
 
 @STRATEGIES.add("adaptive-rounds", AdaptiveRoundsConfig)
