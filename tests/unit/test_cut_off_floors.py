@@ -15,6 +15,7 @@ from pilotage.experiments.mission import mission_of, read_mission
 from pilotage.maps.floor import Floor
 from pilotage.maps.occupancy_grid import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from pilotage.maps.world_map import WorldMap
+from pilotage.stack.patrol.derive import derive_drivable
 from support.patrol_floors import walled, with_door
 
 
@@ -45,6 +46,23 @@ def test_a_passage_is_found_wherever_the_map_begins(x_m: float, y_m: float) -> N
     world = WorldMap("rooms", (x_m, y_m, x_m + 6.1, y_m + 3.05), grid=grid)
     floor = Floor.of(world, 0.35, inside_xy_m=(x_m + 1.5, y_m + 1.5))
     assert floor.reachable[floor.cell_of(np.array([x_m + 4.5, y_m + 1.5]))]
+
+
+@pytest.mark.parametrize(("side_m", "cells", "both"), [(0.1, 8, True), (0.05, 16, True), (0.1, 7, False)])
+@pytest.mark.parametrize("x_m", [0.0, 0.03, -17.5])
+def test_a_patrol_counts_on_doors_as_wide_as_it_asks_for(
+    side_m: float, cells: int, both: bool, x_m: float
+) -> None:
+    """A body of 0.6 m with 0.1 m on either side: of drawn houses with doors of 0.8 m one room was left."""
+    drawn = np.zeros((round(3.1 / side_m), round(6.3 / side_m)), np.bool_)
+    drawn[[0, -1]] = drawn[:, [0, 31, -1]] = True
+    drawn[10 : 10 + cells, 31] = False
+    rows, columns = drawn.shape
+    grid = OccupancyGrid.of(drawn, side_m, Pose2(x_m, -7.6, 0.0))
+    world = WorldMap("rooms", (x_m, -7.6, x_m + columns * side_m, -7.6 + rows * side_m), grid=grid)
+    _, derived = derive_drivable(world, 0.3)
+    x = derived.graph.vertices_xy_m[:, 0] - x_m
+    assert (x.min() < 31 * side_m and x.max() > 32 * side_m) == both
 
 
 def test_what_nobody_could_come_to_is_not_left_out() -> None:

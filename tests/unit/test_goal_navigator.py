@@ -113,6 +113,16 @@ def test_new_plans_on_the_way_to_one_goal_do_not_count_on_the_way_to_the_next() 
     assert context.status is StackStatus.RUNNING
 
 
+def test_a_path_that_ends_at_the_rim_of_the_tolerance_has_not_reached_the_goal() -> None:
+    """It believed to be 0.298 m away, said that it had arrived within 0.3 m, and stood 0.304 m away."""
+    told = told_of(start=START, variances=(1e-4, 1e-4, 1e-4))
+    told = replace(told, task=replace(told.task, goals=(Goal(8.0, 6.0),), goal_tolerance_m=0.3))
+    context = navigator(told, told.localizer(EkfLandmarkLocalizer, LandmarkFilterConfig()))._context
+    for to_go_m, off_m, there in ((0.0, 0.298, False), (0.0, 0.2, True), (0.2, 0.2, False), (0.2, 0.1, True)):
+        context.to_go_m = to_go_m
+        assert context.near_goal(Pose2(8.0 - off_m, 6.0, 0.0)) == there
+
+
 def test_who_goes_around_nobody_says_so_among_others() -> None:
     """Two that came towards each other collided, and no word of it."""
     for mates, said in ((0, []), (1, ["another robot drives about"]), (3, ["3 others drive about"])):

@@ -154,6 +154,16 @@ class TestImages:
         (tmp_path / "plain.pgm").write_text("P2\n# a comment\n3 2\n255\n0 40 80\n120 160 200\n")
         assert (read_grey(tmp_path / "plain.pgm")[0] == grey).all()
 
+    @pytest.mark.parametrize("mode", ["RGB", "RGBA", "P"])
+    def test_nearly_grey_counts_as_grey(self, tmp_path: Path, mode: str) -> None:
+        """Drawing programs' palettes and smoothed edges are off by one to three; such maps were refused."""
+        shades = [[0, 1, 1], [2, 0, 2], [254, 254, 251], [205, 205, 205]]
+        image = Image.fromarray(np.array([shades], np.uint8))
+        image = image.quantize(8) if mode == "P" else image.convert(mode)
+        assert image.mode == mode
+        image.save(tmp_path / "a.png")
+        assert read_grey(tmp_path / "a.png")[0].tolist() == [[1, 1, 253, 205]]
+
     @pytest.mark.parametrize("name", ["a.png", "a.pgm", "a.tif", "plain.pgm"])
     def test_sixteen_bits_are_read_as_they_are(self, tmp_path: Path, name: str) -> None:
         path, deep = tmp_path / name, np.array([[0, 1, 32767], [32768, 52000, 65535]], np.uint16)

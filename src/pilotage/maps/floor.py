@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 import scipy
@@ -18,6 +18,7 @@ from pilotage.kernels.grids.theta import line_of_sight
 from pilotage.kernels.grids.travel_cost import some_travel_costs
 from pilotage.kernels.patrol.pull import pulled_corners
 from pilotage.maps.distance_field import DistanceField
+from pilotage.maps.passage_middles import beside_middles
 from pilotage.maps.pieces import beside_edge, meant_piece, outside_of
 from pilotage.maps.world_map import WorldMap
 
@@ -103,6 +104,7 @@ class Floor:
         inside_xy_m: tuple[float, float] | None = None,
         *,
         exact: bool = False,
+        between: bool = False,
     ) -> Floor:
         """Lay cells over a map.
 
@@ -115,6 +117,8 @@ class Floor:
         exact
             Distances are measured in the cells' middles where the walls are known; between nodes of the map's
             field, farther apart than passages are wide, they are some centimetres off.
+        between
+            Without a size, cells beside a passage's middle that lies between them have the room that it has.
 
         Raises
         ------
@@ -122,21 +126,18 @@ class Floor:
             Where the robot fits nowhere, or not at the place.
         """
 
-        def laid(cell_m: float, exact: bool) -> Floor:
-            where = f"map '{world.name}'"
-            return Floor.of_field(
-                world.field, world.bounds_m, radius_m, cell_m, inside_xy_m, where, exact=exact, world=world
-            )
-
+        field, where = world.field, f"map '{world.name}'"
+        laid = partial(Floor.of_field, field, world.bounds_m, radius_m, world=world)
+        fine_laid = partial(laid, CELLS_M[1], inside_xy_m, where, exact=True, between=between)
         if cell_m is not None:
-            return laid(cell_m, exact)
+            return laid(cell_m, inside_xy_m, where, exact=exact)
         try:
-            coarse = laid(CELLS_M[0], exact)
+            coarse = laid(CELLS_M[0], inside_xy_m, where, exact=exact)
         except InputError:  # the place is in such a passage
-            return laid(CELLS_M[1], True)
+            return fine_laid()
         lost = coarse.middles(coarse.beside_passages)
         # Between nodes on both sides of a passage's middle there is no more room than at them.
-        fine = laid(CELLS_M[1], True) if len(lost) else coarse
+        fine = fine_laid() if len(lost) else coarse
         return fine if fine.reachable[fine.cells_of(lost)].any() else coarse
 
     @staticmethod
@@ -149,12 +150,13 @@ class Floor:
         where: str = "map",
         *,
         exact: bool = False,
+        between: bool = False,
         most_cells: int = MOST_CELLS,
         world: WorldMap | None = None,
     ) -> Floor:
         """Lay so many cells at most over distances to walls; as ``of``.
 
-        Without a ``world`` nothing lies outside.
+        Without a ``world`` nothing lies outside. What is ``between`` cells is known of exact distances alone.
         """
         xmin, ymin, xmax, ymax = bounds_m
         cell_m = cell_side_m(bounds_m, cell_m, most_cells)
@@ -171,6 +173,9 @@ class Floor:
                 clearance > HALF_DIAGONAL * field.resolution_m
             )
             np.negative(clearance, out=clearance, where=solid)
+            if between:
+                first = float(x[0]), float(y[0])
+                clearance[beside_middles(clearance, first, cell_m, radius_m, walls)] = radius_m
         else:
             clearance = field.at(points).reshape(rows, columns)
         # What lies past the bounds is no floor, though the field calls it as near as their edge.

@@ -24,10 +24,13 @@ WHITE_FROM = 128
 DEEPEST = 65535
 STEP = 257
 """What 8 bits become in 16: 255 and 65535 are both white."""
+NEARLY_GREY = 8
+"""Of 255: by how much a pixel's red, green and blue may differ, as palettes and smoothed edges of grey
+drawings do. Of what is more coloured map servers do not agree how dark it is."""
 
 
 def read_grey(path: Path, size: tuple[int, int] | None = None) -> tuple[GreyArray, ByteArray | None]:
-    """Read an image whose colours are all grey, of up to 16 bits a pixel.
+    """Read an image whose colours are all grey, or nearly, of up to 16 bits a pixel.
 
     Parameters
     ----------
@@ -71,9 +74,10 @@ def _grey(image: Image.Image, path: Path) -> tuple[GreyArray, ByteArray | None]:
     if array.ndim == 2:
         return array, None
     colours = array[..., : 3 if image.mode.startswith("RGB") else 1]
-    grey = np.ascontiguousarray(colours[..., 0])
-    if (colours != grey[..., None]).any():
+    if (colours.max(-1) - colours.min(-1) > NEARLY_GREY).any():
         raise InputError(f"image '{path}': expected grey pixels, found coloured ones; convert it to grey")
+    channels = colours.shape[-1]
+    grey = ((colours.sum(-1, dtype=np.uint16) + channels // 2) // channels).astype(np.uint8)
     return grey, np.ascontiguousarray(array[..., -1]) if image.mode.endswith("A") else None
 
 

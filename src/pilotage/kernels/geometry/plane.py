@@ -43,6 +43,15 @@ def distance_to_nearest(px: float, py: float, segments: FloatArray, circles: Flo
 
 
 @kernel
+def distances_to_nearest(points: FloatArray, segments: FloatArray, circles: FloatArray) -> FloatArray:
+    """``distance_to_nearest`` (K,) of points (K, 2)."""
+    out = np.empty(points.shape[0])
+    for k in range(points.shape[0]):
+        out[k] = distance_to_nearest(points[k, 0], points[k, 1], segments, circles)
+    return out
+
+
+@kernel
 def segments_cross(
     ax: float, ay: float, bx: float, by: float, cx: float, cy: float, dx: float, dy: float
 ) -> bool:

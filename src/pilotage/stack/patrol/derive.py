@@ -30,6 +30,8 @@ FAR_M = 8.0
 """As far as a vertex is taken to see by lasers that see farther."""
 CLOSE_M, CLOSE_EVERY_M = 1.5, 0.1
 """What is seen from none of the places to look from is looked at from so near, by places so near together."""
+ROUNDING_M = 1e-9
+"""A door as wide as asked for counts, wherever on the map it lies: drawn ones are whole cells wide."""
 
 
 class DerivationConfig(Config):
@@ -156,7 +158,8 @@ def derive_drivable(
     config = config or DerivationConfig()
     floor = Floor.of(world, radius_m, inside_xy_m=inside_xy_m)
     derived = derive_graph(world, floor, config)
-    roomy = Floor.of(world, radius_m + config.room_m, inside_xy_m=inside_xy_m)
+    wide_m = radius_m + config.room_m - ROUNDING_M
+    roomy = Floor.of(world, wide_m, inside_xy_m=inside_xy_m, between=True)
     # Behind a door that is too narrow the nearest of its cells that are reached may be before the door.
     fits = replace(roomy, reachable=roomy.clearance_m >= roomy.radius_m)
     try:

@@ -40,6 +40,8 @@ from pilotage.stack.planning.planner import PlanResult
 
 HERE_TOLERANCE_M = 0.005
 """Slack between what a plan keeps and what is checked while driving it."""
+ENDS_WITHIN = 0.75
+"""Of the goal's tolerance: whose path ends farther away, as he believes, has not reached it for sure."""
 
 MAPPED_TOLERANCE_M = 0.02
 """What the robot maps is drawn a little too large: where it stands there was room for it."""
@@ -97,6 +99,7 @@ class Context(Standing):
         self.goals: list[Goal] = list(task.goals)
         self._task, self._tolerance_m = task, task.goal_tolerance_m
         self._arrival_m = min(config.arrival_m, arrival_within_m(None, task.goal_tolerance_m))
+        self._passes_m = ENDS_WITHIN * task.goal_tolerance_m
         self.turns_on_the_spot = robot.motion.least_turning_radius_m == 0.0
         # Without a mapper it minds nothing but its map: who shows it wrong scans shows it nobody.
         self.bodies = MovingBodies(
@@ -319,7 +322,7 @@ class Context(Standing):
         away = math.hypot(pose.x_m - goal.x_m, pose.y_m - goal.y_m)
         if self.to_go_m > away + self._tolerance_m:
             return False
-        return away <= self._arrival_m or (away <= self._tolerance_m and self.to_go_m < 0.02)
+        return away <= self._arrival_m or (away <= self._passes_m and self.to_go_m < 0.02)
 
     def turn_at_goal_rad(self, pose: Pose2) -> float:
         """How far to turn at the last goal; 0 where its heading is met, or the robot cannot turn so."""
