@@ -135,6 +135,9 @@ def describe(
         close = nearest(path[-1], known)
         away = elsewhere(model, path[-1], more() if more else {}, exactly=close is not None)
         close = (f"{where}.{away}" if where else away) if away else close
+        # Such as a disc's radius in a polygon: neither another key nor another place is meant.
+        if len(path) > 2 and path[-1] in _taken_by_others(model, path[:-1]):
+            close = None
         hint = f"did you mean '{close}'?" if close else "known keys: " + ", ".join(sorted(known))
         return f"{place}: unknown key; {hint}"
     if first["type"] == "missing":
@@ -145,8 +148,9 @@ def describe(
     if known:
         key, found = first.get("ctx", {}).get("discriminator", ""), first["input"]
         if key:
-            place = f"{place}.{key.strip(chr(39))}" if place else key.strip(chr(39))
-            found = first["ctx"]["tag"]
+            # One that is told by a function has the function's name here, which no file knows.
+            said = [part for part in (place, key.strip("'")) if part and not part.endswith("()")]
+            place, found = ".".join(said), first["ctx"]["tag"]
         close = nearest(str(found), known)
         hint = f"did you mean '{close}'?" if close else "known: " + ", ".join(known)
         return f"{place}: unknown value {_show(found)}; {hint}"
@@ -229,17 +233,22 @@ def _fields_at(model: type[BaseModel], path: list[str]) -> list[str]:
 
 def _model_at(model: type[BaseModel], path: list[str]) -> type[BaseModel]:
     """The model that ``path`` leads to, or the last one on the way there."""
+    return _led_to(model, path)[0]
+
+
+def _led_to(model: type[BaseModel], path: list[str]) -> tuple[type[BaseModel], Any]:
+    """That model, and what the last field on the way there may be."""
     current: type[BaseModel] = model
     annotation: Any = None
     for part in path:
         field = current.model_fields.get(part)
         if field is not None:
             annotation = field.annotation
-        inner = _model_in(annotation) if field is not None else _model_tagged(annotation, part)
+        inner = _model_in(annotation) if field is not None else _alternatives(annotation).get(part)
         if inner is None:
             continue
         current = inner
-    return current
+    return current, annotation
 
 
 def _without_tags(model: type[BaseModel], path: list[str]) -> list[str]:
@@ -249,8 +258,8 @@ def _without_tags(model: type[BaseModel], path: list[str]) -> list[str]:
     said = []
     for part in path:
         field = None if current is None else current.model_fields.get(part)
-        if field is None and _has_tag(annotation, part):
-            current = _model_tagged(annotation, part)
+        if field is None and part in (alternatives := _alternatives(annotation)):
+            current = alternatives[part]
             continue
         said.append(part)
         if field is not None:
@@ -259,22 +268,25 @@ def _without_tags(model: type[BaseModel], path: list[str]) -> list[str]:
     return said
 
 
-def _has_tag(annotation: Any, tag: str) -> bool:
-    """Whether a tag stands for one of the alternatives of an annotation."""
-    if any(getattr(note, "tag", None) == tag for note in getattr(annotation, "__metadata__", ())):
-        return True
-    return any(_has_tag(argument, tag) for argument in getattr(annotation, "__args__", ()))
+def _taken_by_others(model: type[BaseModel], path: list[str]) -> set[str]:
+    """Keys of the alternatives to the one that ``path`` ends with; none where there is no choice."""
+    _, annotation = _led_to(model, path[:-1])
+    others = [other for tag, other in _alternatives(annotation).items() if tag != path[-1]]
+    return {name for other in others if other is not None for name in other.model_fields}
 
 
-def _model_tagged(annotation: Any, tag: str) -> type[BaseModel] | None:
-    """The model that a tag stands for among the alternatives of an annotation."""
-    if any(getattr(note, "tag", None) == tag for note in getattr(annotation, "__metadata__", ())):
-        return _model_in(annotation)
+def _alternatives(annotation: Any) -> dict[str, type[BaseModel] | None]:
+    """The alternatives of an annotation by their tags; None for those that are no models."""
+    found: dict[str, type[BaseModel] | None] = {}
+    for note in getattr(annotation, "__metadata__", ()):
+        if isinstance(tag := getattr(note, "tag", None), str):
+            return {tag: _model_in(annotation)}
+        if isinstance(key := getattr(note, "discriminator", None), str):
+            for other in get_args(get_args(annotation)[0]):
+                found |= dict.fromkeys(get_args(other.model_fields[key].annotation), other)
     for argument in getattr(annotation, "__args__", ()):
-        found = _model_tagged(argument, tag)
-        if found is not None:
-            return found
-    return None
+        found |= _alternatives(argument)
+    return found
 
 
 def _model_in(annotation: Any) -> type[BaseModel] | None:

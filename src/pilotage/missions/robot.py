@@ -31,9 +31,8 @@ class PolygonFootprint(Config):
 def _outline(value: Any) -> str:
     """Tell the two apart by their name, or by what is given."""
     given = value if isinstance(value, Mapping) else getattr(value, "__dict__", {})
-    name = given.get("name")
-    if name in ("disc", "polygon"):
-        return str(name)
+    if given.get("name") is not None:
+        return str(given["name"])
     return "polygon" if "points_m" in given else "disc"
 
 
