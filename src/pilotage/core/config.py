@@ -6,11 +6,14 @@ import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from types import NoneType, UnionType
-from typing import Any, Self, TypeAlias, TypeVar, Union, get_args, get_origin
+from typing import Any, ClassVar, Self, TypeAlias, TypeVar, Union, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
 from pilotage.core.errors import InputError, nearest
+
+FARTHEST_M = 1e9
+"""No place on a map is farther from its origin."""
 
 
 class Config(BaseModel):
@@ -27,6 +30,9 @@ class Config(BaseModel):
         # A component's parameters are written out before they are validated: not a number stays what it is.
         ser_json_inf_nan="constants",
     )
+
+    largest: ClassVar[float] = 1e15
+    """Metres, radians, seconds, their variances and counts in files are far within."""
 
     @model_validator(mode="before")
     @classmethod
@@ -49,7 +55,7 @@ class Config(BaseModel):
     def _numbers_are_quantities(self) -> Self:
         """Refuse what is finite and yet no length, time or variance, in text and lists too."""
         for name in type(self).model_fields:
-            wrong = _out_of_range(getattr(self, name), name)
+            wrong = _out_of_range(getattr(self, name), name, self.largest)
             if wrong is not None:
                 raise ValueError(wrong)
         return self
@@ -60,8 +66,14 @@ def _takes(annotation: Any, *kinds: type) -> bool:
     return annotation in kinds or any(_takes(part, *kinds) for part in getattr(annotation, "__args__", ()))
 
 
-SMALLEST, LARGEST, LARGEST_WHOLE = 1e-100, 1e15, 2**63 - 1
-"""Sizes of the numbers in files: metres, radians, seconds, their variances and counts are far within."""
+class MapConfig(Config):
+    """A config of places and lengths on a map, which are no farther than records hold."""
+
+    largest: ClassVar[float] = FARTHEST_M
+
+
+SMALLEST, LARGEST, LARGEST_WHOLE = 1e-100, Config.largest, 2**63 - 1
+"""Sizes of the numbers in files."""
 
 _DEEPEST = 4
 """Levels of a file in which a key is looked for that stands at the wrong place."""
@@ -101,18 +113,18 @@ def validate(
         raise InputError(describe(error, model, where, more)) from None
 
 
-def _out_of_range(value: Any, place: str) -> str | None:
+def _out_of_range(value: Any, place: str, largest: float) -> str | None:
     """What is wrong with a number that no quantity has: products of such are infinite or no numbers."""
     if isinstance(value, float):
-        if math.isfinite(value) and value != 0.0 and not SMALLEST <= abs(value) <= LARGEST:
+        if math.isfinite(value) and value != 0.0 and not SMALLEST <= abs(value) <= largest:
             return (
-                f"{place}: expected 0 or a number from {SMALLEST:g} to {LARGEST:g} in size, found {value:g}"
+                f"{place}: expected 0 or a number from {SMALLEST:g} to {largest:g} in size, found {value:g}"
             )
     elif isinstance(value, int):
         if abs(value) > LARGEST_WHOLE:
             return f"{place}: expected a whole number below 2^63, found {str(value)[:30]}"
     elif isinstance(value, list | tuple):
-        wrong = (_out_of_range(item, f"{place}.{i}") for i, item in enumerate(value))
+        wrong = (_out_of_range(item, f"{place}.{i}", largest) for i, item in enumerate(value))
         return next((text for text in wrong if text), None)
     return None
 
@@ -163,7 +175,12 @@ def describe(
     message = _as_of_a_file(message[:1].lower() + message[1:])
     # A rule among several keys of one level names the one that it is about.
     key, colon, rest = message.partition(": ")
-    if place and colon and first["type"] == "value_error" and key in _fields_at(model, path):
+    if (
+        place
+        and colon
+        and first["type"] == "value_error"
+        and key.partition(".")[0] in _fields_at(model, path)
+    ):
         place, message = f"{place}.{key}", rest
     # A rule that says itself what it found, or is about the whole file: the dump would only bury it.
     if place and ", found " not in message:

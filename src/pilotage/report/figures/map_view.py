@@ -87,17 +87,18 @@ def _world_points(run: RunData) -> FloatArray:
 
 
 def _extent(points: FloatArray, relative: float, least_m: float) -> Limits | None:
-    """Return the limits of the finite points with a margin, in parts of their size and at least in metres.
-
-    It is never so small beside the points' own numbers that axes could not tell them apart.
-    """
+    """Return the limits of the finite points with a margin, in parts of their size and at least in metres."""
     points = points[np.isfinite(points).all(axis=1)]
     if not len(points):
         return None
     (x_min, y_min), (x_max, y_max) = points.min(axis=0), points.max(axis=0)
-    least_m = max(least_m, _LEAST_MARGIN_M, _FINEST * float(np.abs(points).max()))
-    margin = max(relative * max(x_max - x_min, y_max - y_min), least_m)
+    margin = max(relative * max(x_max - x_min, y_max - y_min), drawable_m(least_m, points))
     return float(x_min - margin), float(y_min - margin), float(x_max + margin), float(y_max + margin)
+
+
+def drawable_m(room_m: float, points: FloatArray) -> float:
+    """Room around points (n, 2), never so little beside their numbers that axes cannot tell them apart."""
+    return max(room_m, _LEAST_MARGIN_M, _FINEST * float(np.abs(points).max()))
 
 
 def map_axes(limits: Limits) -> tuple[Figure, Axes, float]:
