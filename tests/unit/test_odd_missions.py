@@ -16,6 +16,7 @@ from pilotage.experiments.build import obstacles
 from pilotage.experiments.build.build import build
 from pilotage.experiments.loop import run_loop
 from pilotage.experiments.mission import mission_of
+from pilotage.experiments.run import run_mission
 from pilotage.maps.landmarks import Landmarks
 from pilotage.maps.segment_map import SegmentMap
 from pilotage.missions.world import AcrossPathObstacle
@@ -124,3 +125,19 @@ def test_on_a_large_map_few_draws_look_for_a_way_around(monkeypatch: pytest.Monk
             [box], ROOM, Pose2(1.0, 4.0, 0.0), Goal(9.0, 4.0), path, 0.3, np.random.default_rng(0)
         )
     assert len(looked) == 1
+
+
+def test_robots_without_a_start_begin_where_their_sheet_says() -> None:
+    values = explore()
+    values["robots"], values["run"]["time_limit_s"] = [{"name": "ada"}], 0.05
+    start = build(mission_of(values)).mission.robots[0].start
+    assert start is not None
+    assert (start.x_m, start.y_m) == (0.25, 0.2)
+
+
+def test_an_explorer_that_only_drives_leaves_a_whole_folder(tmp_path: Path) -> None:
+    values = explore()
+    values["task"], values["run"]["time_limit_s"] = "drive", 0.05
+    run_dir = run_mission(mission_of(values), out=tmp_path).run_dir
+    assert run_dir is not None
+    assert (run_dir / "metrics.json").is_file()
