@@ -58,6 +58,55 @@ def test_a_map_in_the_mission_is_told_what_it_lacks(value: str, said: str) -> No
     assert said in refused(f"world.map={value}")
 
 
+@pytest.mark.parametrize(
+    ("overrides", "said"),
+    [
+        (
+            ["robot.footprint={radius_m: 0.3, points_m: []}"],
+            "robot.footprint.radius_m: unknown key; known keys: name, points_m",
+        ),
+        (
+            ["robot.footprint={name: disc, points_m: []}"],
+            "robot.footprint.points_m: unknown key; known keys: name, radius_m",
+        ),
+        (
+            ["robot.footprint={name: square, radius_m: 0.3}"],
+            "robot.footprint: unknown value 'square'; known: disc, polygon",
+        ),
+        (
+            ["robots=[{footprint: {name: polygn}}]"],
+            "robots.0.footprint: unknown value 'polygn'; did you mean 'polygon'?",
+        ),
+        (
+            ["world.obstacles=[{kind: box, radius_m: 0.3}]"],
+            "world.obstacles.0.radius_m: unknown key; known keys: from_m, kind, thickness_m, to_m",
+        ),
+        (
+            ["run.time_limit_s=0.01"],
+            "run.time_limit_s: expected at least one step of run.dt_s = 0.1 s, found 0.01",
+        ),
+    ],
+)
+def test_what_belongs_to_another_alternative_is_told_what_this_one_takes(
+    overrides: list[str], said: str
+) -> None:
+    """The place is told as the file has it, and nobody is sent to where he is."""
+    assert refused(*overrides) == said
+
+
+def test_a_folder_is_called_so_and_a_shipped_mission_needs_no_suffix(tmp_path: Path) -> None:
+    for name in ("mine.yaml", "mine.py"):
+        (tmp_path / name).mkdir()
+    with pytest.raises(InputError, match=r"expected a YAML file, found a folder$"):
+        load_mission(str(tmp_path / "mine.yaml"))
+    with pytest.raises(InputError, match=r"expected a YAML file of parameters, found a folder$"):
+        load_mission("museum-1", overrides=[f"@{tmp_path / 'mine.yaml'}"])
+    with pytest.raises(InputError, match=r"expected a Python file, found a folder$"):
+        add_plugins([str(tmp_path / "mine.py")])
+    with pytest.raises(InputError, match="did you mean the shipped mission 'museum-1'"):
+        load_mission("museum-1.yaml")
+
+
 def test_a_missing_file_is_told_its_neighbour(tmp_path: Path) -> None:
     (tmp_path / "beeline.py").touch()
     (tmp_path / "beeline.txt").touch()

@@ -175,6 +175,7 @@ METRICS.add(Metric("duration_s", "mine", "s", ""))
         (TAKEN, "planner 'astar': expected a new name, found it registered already"),
         (TAKEN_METRIC, "metric 'duration_s': expected a new key, found it declared already"),
         (None, "expected a Python file, found none there"),
+        ("raise MemoryError", "line 1: MemoryError\n"),
     ],
 )
 def test_a_plugin_that_cannot_be_used_is_one_line(

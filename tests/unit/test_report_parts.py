@@ -21,6 +21,8 @@ from rich.console import Console
 from scipy.stats import chi2
 
 from pilotage.core.types import FloatArray
+from pilotage.experiments.mission import mission_of
+from pilotage.experiments.run import run_mission
 from pilotage.missions.team import LARGEST_TEAM
 from pilotage.records.people import PeopleTracks
 from pilotage.records.run_data import read_run
@@ -33,7 +35,7 @@ from pilotage.report.figures.covariance import covariance_figure
 from pilotage.report.figures.layers import ellipse_outlines
 from pilotage.report.figures.map import map_figure
 from pilotage.report.figures.map_view import map_axes, view_limits
-from pilotage.report.figures.placing import LabelPlacer, along
+from pilotage.report.figures.placing import MOST_PLACES, LabelPlacer, along
 from pilotage.report.headline import headline
 from pilotage.report.light_axes import LightAxes
 from pilotage.report.markup import Html, escape, page, table
@@ -41,7 +43,9 @@ from pilotage.report.replay.floor import floor_scene
 from pilotage.report.series import band, decimate, merge_spans, running_mean, spans
 from pilotage.report.team import colour_of, team_section
 from support.browser import Browser
+from support.component_missions import short
 from support.fabricated_run import fabricate_metrics, fabricate_run, fabricate_world
+from support.missions import drive
 from support.pages import page_of
 
 
@@ -201,6 +205,22 @@ def test_map_shows_the_whole_floor_or_the_part_that_matters(tmp_path: Path) -> N
     assert part[0] > -20.0
     assert part[3] < 30.0
     assert "Only the part of the floor around the run is shown." in page_of(run)
+
+
+@pytest.mark.parametrize("radius_m", [1e-9, 1e-99])
+def test_a_body_too_small_for_axes_has_a_page(radius_m: float, tmp_path: Path) -> None:
+    """The map was zoomed in to ten of its radii: walls had 8e10 places, or it no size."""
+    values = short(drive(), 1)
+    values["robot"]["footprint"]["radius_m"] = radius_m
+    run_dir = run_mission(mission_of(values), out=tmp_path).run_dir
+    assert run_dir is not None
+    assert "<svg" in page_of(run_dir)
+
+
+def test_a_line_that_leaves_the_picture_far_behind_has_no_places_without_end() -> None:
+    places = along(np.array([[0.0, 0.0], [1e3, 0.0]]), 1e-9, 1.5)
+    assert len(places) <= MOST_PLACES + 1
+    assert places[-1, 0] == 1e3
 
 
 def test_a_recording_without_a_truth_is_shown_where_it_believed_to_be(tmp_path: Path) -> None:

@@ -6,11 +6,14 @@ import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from types import NoneType, UnionType
-from typing import Any, Self, TypeAlias, TypeVar, Union, get_args, get_origin
+from typing import Any, ClassVar, Self, TypeAlias, TypeVar, Union, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
 from pilotage.core.errors import InputError, nearest
+
+FARTHEST_M = 1e9
+"""No place on a map is farther from its origin."""
 
 
 class Config(BaseModel):
@@ -27,6 +30,9 @@ class Config(BaseModel):
         # A component's parameters are written out before they are validated: not a number stays what it is.
         ser_json_inf_nan="constants",
     )
+
+    largest: ClassVar[float] = 1e15
+    """Metres, radians, seconds, their variances and counts in files are far within."""
 
     @model_validator(mode="before")
     @classmethod
@@ -49,7 +55,7 @@ class Config(BaseModel):
     def _numbers_are_quantities(self) -> Self:
         """Refuse what is finite and yet no length, time or variance, in text and lists too."""
         for name in type(self).model_fields:
-            wrong = _out_of_range(getattr(self, name), name)
+            wrong = _out_of_range(getattr(self, name), name, self.largest)
             if wrong is not None:
                 raise ValueError(wrong)
         return self
@@ -60,8 +66,14 @@ def _takes(annotation: Any, *kinds: type) -> bool:
     return annotation in kinds or any(_takes(part, *kinds) for part in getattr(annotation, "__args__", ()))
 
 
-SMALLEST, LARGEST, LARGEST_WHOLE = 1e-100, 1e15, 2**63 - 1
-"""Sizes of the numbers in files: metres, radians, seconds, their variances and counts are far within."""
+class MapConfig(Config):
+    """A config of places and lengths on a map, which are no farther than records hold."""
+
+    largest: ClassVar[float] = FARTHEST_M
+
+
+SMALLEST, LARGEST, LARGEST_WHOLE = 1e-100, Config.largest, 2**63 - 1
+"""Sizes of the numbers in files."""
 
 _DEEPEST = 4
 """Levels of a file in which a key is looked for that stands at the wrong place."""
@@ -101,18 +113,18 @@ def validate(
         raise InputError(describe(error, model, where, more)) from None
 
 
-def _out_of_range(value: Any, place: str) -> str | None:
+def _out_of_range(value: Any, place: str, largest: float) -> str | None:
     """What is wrong with a number that no quantity has: products of such are infinite or no numbers."""
     if isinstance(value, float):
-        if math.isfinite(value) and value != 0.0 and not SMALLEST <= abs(value) <= LARGEST:
+        if math.isfinite(value) and value != 0.0 and not SMALLEST <= abs(value) <= largest:
             return (
-                f"{place}: expected 0 or a number from {SMALLEST:g} to {LARGEST:g} in size, found {value:g}"
+                f"{place}: expected 0 or a number from {SMALLEST:g} to {largest:g} in size, found {value:g}"
             )
     elif isinstance(value, int):
         if abs(value) > LARGEST_WHOLE:
             return f"{place}: expected a whole number below 2^63, found {str(value)[:30]}"
     elif isinstance(value, list | tuple):
-        wrong = (_out_of_range(item, f"{place}.{i}") for i, item in enumerate(value))
+        wrong = (_out_of_range(item, f"{place}.{i}", largest) for i, item in enumerate(value))
         return next((text for text in wrong if text), None)
     return None
 
@@ -135,6 +147,9 @@ def describe(
         close = nearest(path[-1], known)
         away = elsewhere(model, path[-1], more() if more else {}, exactly=close is not None)
         close = (f"{where}.{away}" if where else away) if away else close
+        # Such as a disc's radius in a polygon: neither another key nor another place is meant.
+        if len(path) > 2 and path[-1] in _taken_by_others(model, path[:-1]):
+            close = None
         hint = f"did you mean '{close}'?" if close else "known keys: " + ", ".join(sorted(known))
         return f"{place}: unknown key; {hint}"
     if first["type"] == "missing":
@@ -145,8 +160,9 @@ def describe(
     if known:
         key, found = first.get("ctx", {}).get("discriminator", ""), first["input"]
         if key:
-            place = f"{place}.{key.strip(chr(39))}" if place else key.strip(chr(39))
-            found = first["ctx"]["tag"]
+            # One that is told by a function has the function's name here, which no file knows.
+            said = [part for part in (place, key.strip("'")) if part and not part.endswith("()")]
+            place, found = ".".join(said), first["ctx"]["tag"]
         close = nearest(str(found), known)
         hint = f"did you mean '{close}'?" if close else "known: " + ", ".join(known)
         return f"{place}: unknown value {_show(found)}; {hint}"
@@ -159,7 +175,12 @@ def describe(
     message = _as_of_a_file(message[:1].lower() + message[1:])
     # A rule among several keys of one level names the one that it is about.
     key, colon, rest = message.partition(": ")
-    if place and colon and first["type"] == "value_error" and key in _fields_at(model, path):
+    if (
+        place
+        and colon
+        and first["type"] == "value_error"
+        and key.partition(".")[0] in _fields_at(model, path)
+    ):
         place, message = f"{place}.{key}", rest
     # A rule that says itself what it found, or is about the whole file: the dump would only bury it.
     if place and ", found " not in message:
@@ -229,17 +250,22 @@ def _fields_at(model: type[BaseModel], path: list[str]) -> list[str]:
 
 def _model_at(model: type[BaseModel], path: list[str]) -> type[BaseModel]:
     """The model that ``path`` leads to, or the last one on the way there."""
+    return _led_to(model, path)[0]
+
+
+def _led_to(model: type[BaseModel], path: list[str]) -> tuple[type[BaseModel], Any]:
+    """That model, and what the last field on the way there may be."""
     current: type[BaseModel] = model
     annotation: Any = None
     for part in path:
         field = current.model_fields.get(part)
         if field is not None:
             annotation = field.annotation
-        inner = _model_in(annotation) if field is not None else _model_tagged(annotation, part)
+        inner = _model_in(annotation) if field is not None else _alternatives(annotation).get(part)
         if inner is None:
             continue
         current = inner
-    return current
+    return current, annotation
 
 
 def _without_tags(model: type[BaseModel], path: list[str]) -> list[str]:
@@ -249,8 +275,8 @@ def _without_tags(model: type[BaseModel], path: list[str]) -> list[str]:
     said = []
     for part in path:
         field = None if current is None else current.model_fields.get(part)
-        if field is None and _has_tag(annotation, part):
-            current = _model_tagged(annotation, part)
+        if field is None and part in (alternatives := _alternatives(annotation)):
+            current = alternatives[part]
             continue
         said.append(part)
         if field is not None:
@@ -259,22 +285,25 @@ def _without_tags(model: type[BaseModel], path: list[str]) -> list[str]:
     return said
 
 
-def _has_tag(annotation: Any, tag: str) -> bool:
-    """Whether a tag stands for one of the alternatives of an annotation."""
-    if any(getattr(note, "tag", None) == tag for note in getattr(annotation, "__metadata__", ())):
-        return True
-    return any(_has_tag(argument, tag) for argument in getattr(annotation, "__args__", ()))
+def _taken_by_others(model: type[BaseModel], path: list[str]) -> set[str]:
+    """Keys of the alternatives to the one that ``path`` ends with; none where there is no choice."""
+    _, annotation = _led_to(model, path[:-1])
+    others = [other for tag, other in _alternatives(annotation).items() if tag != path[-1]]
+    return {name for other in others if other is not None for name in other.model_fields}
 
 
-def _model_tagged(annotation: Any, tag: str) -> type[BaseModel] | None:
-    """The model that a tag stands for among the alternatives of an annotation."""
-    if any(getattr(note, "tag", None) == tag for note in getattr(annotation, "__metadata__", ())):
-        return _model_in(annotation)
+def _alternatives(annotation: Any) -> dict[str, type[BaseModel] | None]:
+    """The alternatives of an annotation by their tags; None for those that are no models."""
+    found: dict[str, type[BaseModel] | None] = {}
+    for note in getattr(annotation, "__metadata__", ()):
+        if isinstance(tag := getattr(note, "tag", None), str):
+            return {tag: _model_in(annotation)}
+        if isinstance(key := getattr(note, "discriminator", None), str):
+            for other in get_args(get_args(annotation)[0]):
+                found |= dict.fromkeys(get_args(other.model_fields[key].annotation), other)
     for argument in getattr(annotation, "__args__", ()):
-        found = _model_tagged(argument, tag)
-        if found is not None:
-            return found
-    return None
+        found |= _alternatives(argument)
+    return found
 
 
 def _model_in(annotation: Any) -> type[BaseModel] | None:

@@ -10,6 +10,11 @@ from pilotage.core.errors import nearest
 _MOST_NAMED, _MOST_LOOKED_AT = 3, 2000
 
 
+def found_instead(path: Path, suffixes: Collection[str]) -> str:
+    """What was found where a file was looked for: a folder, or nothing and what lies beside it."""
+    return "a folder" if path.is_dir() else f"none there{hint_beside(path, suffixes)}"
+
+
 def hint_beside(path: Path, suffixes: Collection[str]) -> str:
     """The end of an error's line: the file most like a missing one, else what is there; empty for nothing.
 

@@ -18,7 +18,7 @@ from importlib.metadata import entry_points
 from pathlib import Path
 
 from pilotage.core.errors import InputError
-from pilotage.core.neighbours import hint_beside
+from pilotage.core.neighbours import found_instead
 from pilotage.core.shown import shown
 
 GROUP = "pilotage.plugins"
@@ -84,7 +84,7 @@ def _where_it_lies_now(path: str) -> str:
         return path
     if name not in _stand_ins:
         raise PluginError(
-            f"plugin '{path}': expected a Python file, found none there{hint_beside(Path(path), {'.py'})}; "
+            f"plugin '{path}': expected a Python file, found {found_instead(Path(path), {'.py'})}; "
             f"if it was moved, name it where it is now: --plugin FOLDER/{name}"
         )
     return _stand_ins[name]
@@ -146,8 +146,8 @@ def load_file(path: str) -> None:
     if path in _loaded:
         return
     if not Path(path).is_file() or Path(path).suffix != ".py":
-        beside = hint_beside(Path(path), {".py"})
-        raise PluginError(f"plugin '{path}': expected a Python file, found none there{beside}")
+        found = found_instead(Path(path), {".py"})
+        raise PluginError(f"plugin '{path}': expected a Python file, found {found}")
     if _is_among(path, _loaded):
         return
     name = f"pilotage_plugin_{len(_loaded)}_{Path(path).stem}"
@@ -310,4 +310,4 @@ def _named(error: BaseException) -> str:
         text = str(error)
     except Exception:
         text = "without a text that can be shown"
-    return f"{type(error).__name__}: {text}"
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__

@@ -38,7 +38,10 @@ def terrain_columns(run: FinishedRun, robot: RobotRun) -> dict[str, FloatArray]:
     }
     if chart.elevation is not None:
         columns["elevation_m"] = chart.elevation.heights_at(points)
-        columns["slope_rad"] = chart.elevation.slopes_at(chart.grid.cells_at(points))
+        cells = chart.grid.cells_at(points)
+        on = ~off_grid(cells, chart.grid)  # a rover may leave the map
+        columns["slope_rad"] = np.full(len(points), math.nan)
+        columns["slope_rad"][on] = chart.elevation.slopes_at(cells[on])
     if isinstance(robot.motion, BicycleConfig):
         columns["steering_rad"] = steering_rad(trace, robot.motion.wheelbase_m)
     return columns | {"root_determinant_m2": root_determinant(covariances(trace))}
@@ -89,13 +92,18 @@ def terrain_metrics(
     return metrics
 
 
+def off_grid(cells: IntArray, grid: OccupancyGrid) -> BoolArray:
+    """(N,) whether cells (N, 2), as ``cells_at`` tells them, are none of the grid's."""
+    return np.asarray((cells < 0).any(axis=1) | (cells[:, 0] >= grid.rows) | (cells[:, 1] >= grid.columns))
+
+
 def on_hazard(truth: FloatArray, chart: WorldMap) -> BoolArray:
     """(N,) whether (N, 3) poses lie on a hazard or off the ground."""
     grid = chart.grid
     if grid is None:
         return np.zeros(len(truth), dtype=bool)
     cells = grid.cells_at(truth[:, :2])
-    off = (cells < 0).any(axis=1) | (cells[:, 0] >= grid.rows) | (cells[:, 1] >= grid.columns)
+    off = off_grid(cells, grid)
     off[~off] = grid.blocked()[cells[~off, 0], cells[~off, 1]]
     return off
 

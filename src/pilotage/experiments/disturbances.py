@@ -74,11 +74,11 @@ class Disturbances:
         self._names = [robot.name for robot in mission.members]
         self._kidnaps = sorted(mission.world.kidnaps, key=lambda kidnap: kidnap.at_s)
         failures = mission.team.failures
-        # Repairs come before what fails at the same time.
+        # Repairs come before what fails at the same time, and after their own failure, however short it was.
         self._changes = sorted(
             [(failure.at_s, 1, failure) for failure in failures]
             + [
-                (failure.at_s + failure.for_s, 0, failure)
+                (max(failure.at_s + failure.for_s, math.nextafter(failure.at_s, math.inf)), 0, failure)
                 for failure in failures
                 if failure.for_s is not None
             ],

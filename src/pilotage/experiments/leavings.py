@@ -166,6 +166,8 @@ def _cells(run: FinishedRun, robot: RobotRun, world: World, verdict: Verdict) ->
     markings = run.chart.markings
     if not isinstance(cells, CellMap) or markings is None or markings.source is None:
         return None
+    if f"{robot.name}/visited" not in verdict.extras:
+        return None  # an explorer may drive in a task that does not judge exploring
     left = robot.results["left"]
     told = {
         name: verdict.extras[f"{robot.name}/{name}"] for name in ("visited", "first_visit_s", "reachable")

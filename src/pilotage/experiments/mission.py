@@ -12,7 +12,7 @@ from typing import Any
 from pilotage.core.config import validate
 from pilotage.core.errors import InputError, nearest, unknown_name
 from pilotage.core.file_kinds import check_kind
-from pilotage.core.neighbours import hint_beside
+from pilotage.core.neighbours import found_instead
 from pilotage.core.plugins import add_plugins, is_package, named_plugins
 from pilotage.experiments.named_files import anchored
 from pilotage.experiments.resolve import check_components, component_places
@@ -108,8 +108,8 @@ def read_parameters(file: str) -> dict[str, Any]:
     """Read a file of parameters that is laid over a mission; only what a mission knows may be in it."""
     path = Path(file)
     if not path.is_file():
-        beside = hint_beside(path, {".yaml", ".yml"})
-        raise InputError(f"--set '@{file}': expected a YAML file of parameters, found none there{beside}")
+        found = found_instead(path, {".yaml", ".yml"})
+        raise InputError(f"--set '@{file}': expected a YAML file of parameters, found {found}")
     values = _at_their_places(parse_yaml(read_text(path), file), path.parent)
     unknown = [str(key) for key in values if key not in TOP_KEYS]
     if unknown:
@@ -128,8 +128,10 @@ def read_mission(name_or_path: str, extended_by: tuple[str, ...] = ()) -> dict[s
     path = Path(name_or_path)
     if _is_path(name_or_path):
         if not path.is_file():
-            beside = hint_beside(path, {".yaml", ".yml"})
-            raise InputError(f"mission file '{name_or_path}': expected a YAML file, found none there{beside}")
+            found = found_instead(path, {".yaml", ".yml"})
+            if path.stem in shipped_missions():
+                found = f"none there; did you mean the shipped mission '{path.stem}'?"
+            raise InputError(f"mission file '{name_or_path}': expected a YAML file, found {found}")
         values = parse_yaml(read_text(path), str(path))
         check_kind(values, "mission", str(path))
         values = _at_their_places(values, path.parent)

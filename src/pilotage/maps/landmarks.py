@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pilotage.core.config import FARTHEST_M
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.kernels.filters.sighting import Known
@@ -27,8 +28,10 @@ class Landmarks:
             )
         if np.unique(ids).shape[0] != ids.shape[0]:
             raise InputError("landmarks: expected every id once, found one twice")
-        if not np.isfinite(points).all():
-            raise InputError("landmarks: expected finite coordinates, found NaN or infinity")
+        if not (np.abs(points) <= FARTHEST_M).all():
+            raise InputError(
+                f"landmarks: expected coordinates within {FARTHEST_M:g} m, found others, NaN or infinity"
+            )
         ids.flags.writeable = False
         points.flags.writeable = False
         object.__setattr__(self, "ids", ids)

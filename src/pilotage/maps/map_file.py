@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from pydantic import model_validator
 
-from pilotage.core.config import Config, validate
+from pilotage.core.config import MapConfig, validate
 from pilotage.core.errors import InputError
 from pilotage.core.limits import limit, too_large
 from pilotage.maps.landmarks import Landmarks
@@ -19,7 +19,7 @@ MOST_PARTS = 10_000
 Coordinates = tuple[float, float, float, float]
 
 
-class LandmarkEntry(Config):
+class LandmarkEntry(MapConfig):
     """One landmark."""
 
     id: int
@@ -27,7 +27,7 @@ class LandmarkEntry(Config):
     y_m: float
 
 
-class MapFile(Config):
+class MapFile(MapConfig):
     """The file's schema: metres, x right, y up."""
 
     map: str

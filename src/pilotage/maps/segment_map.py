@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pilotage.core.config import FARTHEST_M
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.kernels.geometry import plane
@@ -32,8 +33,11 @@ class SegmentMap:
     def __post_init__(self) -> None:
         segments = np.ascontiguousarray(self.segments_m, dtype=np.float64).reshape(-1, 4)
         circles = np.ascontiguousarray(self.circles_m, dtype=np.float64).reshape(-1, 3)
-        if not (np.isfinite(segments).all() and np.isfinite(circles).all()):
-            raise InputError("map: expected finite coordinates, found NaN or infinity; mend the map file")
+        if not ((np.abs(segments) <= FARTHEST_M).all() and (np.abs(circles) <= FARTHEST_M).all()):
+            raise InputError(
+                f"map: expected coordinates within {FARTHEST_M:g} m, found others, NaN or infinity; "
+                "mend the map file"
+            )
         if (circles[:, 2] <= 0.0).any():
             raise InputError("map: expected circles of positive radius, found one that is not")
         xmin, ymin, xmax, ymax = self.bounds_m

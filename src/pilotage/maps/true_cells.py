@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from pilotage.core.config import Config, validate
+from pilotage.core.config import MapConfig, validate
 from pilotage.core.files import read_yaml
 from pilotage.maps.cell_map import CellMap, CellState, TrueCellMap
 from pilotage.maps.cell_map_text import features_only, read_cell_map
@@ -23,7 +23,7 @@ Count = Annotated[int, Field(ge=1, le=1000)]
 Point = tuple[float, float]
 
 
-class SheetFile(Config):
+class SheetFile(MapConfig):
     """A sheet on the floor: metres, origin lower left, x right, y up."""
 
     size_m: tuple[Positive, Positive]

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from pilotage.core.config import FARTHEST_M
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
 from pilotage.kernels.geometry.plane import NO_CIRCLES, NO_SEGMENTS
@@ -20,7 +21,6 @@ from pilotage.maps.occupancy_grid import OccupancyGrid
 from pilotage.maps.outlines import outlines
 from pilotage.maps.segment_map import SegmentMap
 
-FARTHEST_M = 1e9
 NO_LANDMARKS = Landmarks(np.zeros(0, dtype=np.int64), np.zeros((0, 2)))
 
 

@@ -93,7 +93,10 @@ class Mission(Config):
     @model_validator(mode="after")
     def _consistent(self) -> Mission:
         if self.run.time_limit_s < self.run.dt_s:
-            raise ValueError("run.time_limit_s must be at least run.dt_s")
+            raise ValueError(
+                f"run.time_limit_s: expected at least one step of run.dt_s = {self.run.dt_s:g} s, "
+                f"found {self.run.time_limit_s:g}"
+            )
         names = [robot.name for robot in self.robots]
         if len(set(names)) < len(names):
             twice = next(name for name in names if names.count(name) > 1)

@@ -6,13 +6,13 @@ import math
 
 from pydantic import Field
 
-from pilotage.core.config import Config
+from pilotage.core.config import Config, MapConfig
 from pilotage.sensors.sensor import NonNegative, Positive
 
 Point = tuple[float, float]
 
 
-class PoseConfig(Config):
+class PoseConfig(MapConfig):
     """A start pose."""
 
     x_m: float
@@ -20,7 +20,7 @@ class PoseConfig(Config):
     theta_rad: float = Field(default=0.0, ge=-2 * math.pi, le=2 * math.pi)
 
 
-class GoalConfig(Config):
+class GoalConfig(MapConfig):
     """A goal; without a heading any heading will do."""
 
     x_m: float

@@ -7,21 +7,21 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag, field_validator
 
-from pilotage.core.config import Config
+from pilotage.core.config import Config, MapConfig
 from pilotage.missions.choice import ComponentChoice, by_default
 from pilotage.missions.places import GoalConfig, Point, PoseConfig
 from pilotage.missions.stack import StackConfig
 from pilotage.sensors.sensor import Positive
 
 
-class DiscFootprint(Config):
+class DiscFootprint(MapConfig):
     """A disc around the axle's middle."""
 
     name: Literal["disc"] = "disc"
     radius_m: Positive = 0.30
 
 
-class PolygonFootprint(Config):
+class PolygonFootprint(MapConfig):
     """Corners in the base frame: x forward, y left, the axle's middle at (0, 0)."""
 
     name: Literal["polygon"] = "polygon"
@@ -31,9 +31,8 @@ class PolygonFootprint(Config):
 def _outline(value: Any) -> str:
     """Tell the two apart by their name, or by what is given."""
     given = value if isinstance(value, Mapping) else getattr(value, "__dict__", {})
-    name = given.get("name")
-    if name in ("disc", "polygon"):
-        return str(name)
+    if given.get("name") is not None:
+        return str(given["name"])
     return "polygon" if "points_m" in given else "disc"
 
 

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Discriminator, Field, Tag
 
-from pilotage.core.config import Config, rising
+from pilotage.core.config import Config, MapConfig, rising
 from pilotage.maps.map_file import LandmarkEntry
 from pilotage.missions.choice import ComponentChoice
 from pilotage.missions.map_choice import MapChoice
@@ -18,7 +18,7 @@ Share = Annotated[float, Field(ge=0.0, le=1.0)]
 Shares = Annotated[tuple[Share, Share], AfterValidator(rising)]
 
 
-class BoxObstacle(Config):
+class BoxObstacle(MapConfig):
     """A box along the line from one point to another."""
 
     kind: Literal["box"]
@@ -27,7 +27,7 @@ class BoxObstacle(Config):
     thickness_m: Positive = 0.3
 
 
-class CircleObstacle(Config):
+class CircleObstacle(MapConfig):
     """A round obstacle."""
 
     kind: Literal["circle"]
@@ -61,7 +61,7 @@ Obstacle = Annotated[
 ]
 
 
-class MarkingsConfig(Config):
+class MarkingsConfig(MapConfig):
     """What a sheet's file leaves out."""
 
     tape_width_m: Positive = 0.015

@@ -9,12 +9,12 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from pilotage.core.config import FARTHEST_M
 from pilotage.core.errors import InputError
 from pilotage.core.files.arrays import read_npz, require_numbers
 from pilotage.core.limits import MB, limit
 from pilotage.core.misfit import LARGEST
 from pilotage.core.types import FloatArray, IntArray
-from pilotage.records.numbers import FARTHEST_M
 from pilotage.records.reading import broken, is_there
 
 T = TypeVar("T")

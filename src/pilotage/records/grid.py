@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
+from pilotage.core.config import FARTHEST_M
 from pilotage.core.types import Pose2
 from pilotage.maps.occupancy_grid import OCCUPIED, UNKNOWN, OccupancyGrid
 from pilotage.maps.ros_map import read_ros_map
 from pilotage.records.arrays import Arrays, read_record, write_arrays
-from pilotage.records.numbers import FARTHEST_M
 from pilotage.records.reading import is_there
 
 GRID_FILE = "grid.npz"

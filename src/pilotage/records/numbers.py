@@ -6,11 +6,9 @@ import math
 
 import numpy as np
 
+from pilotage.core.config import FARTHEST_M
 from pilotage.core.misfit import LARGEST
 from pilotage.core.types import FloatArray
-
-FARTHEST_M = 1e9
-"""No place on a map is farther from its origin."""
 
 Pose = tuple[float, float, float | None]
 """x and y in metres and a heading in radians, None where it is free."""

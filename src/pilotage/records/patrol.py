@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
+from pilotage.core.config import FARTHEST_M
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.records.arrays import Arrays, read_record, write_arrays
-from pilotage.records.numbers import FARTHEST_M
 
 PATROL_FILE = "patrol.npz"
 

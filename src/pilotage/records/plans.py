@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from pilotage.core.config import FARTHEST_M
 from pilotage.core.types import FloatArray
 from pilotage.records.arrays import Arrays, read_record, write_arrays
 from pilotage.records.events import LATEST_S
-from pilotage.records.numbers import FARTHEST_M
 
 PLANS_FILE = "plans.npz"
 

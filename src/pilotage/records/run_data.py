@@ -10,6 +10,7 @@ from typing import Any, TypedDict, TypeVar
 
 import numpy as np
 
+from pilotage.core.config import FARTHEST_M
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, Event, FloatArray
 from pilotage.maps.occupancy_grid import OccupancyGrid
@@ -20,7 +21,7 @@ from pilotage.records.grid import read_grid_layer, read_own_map
 from pilotage.records.localizer import read_localizer
 from pilotage.records.metrics import METRICS_FILE, read_metrics
 from pilotage.records.mission import read_mission
-from pilotage.records.numbers import FARTHEST_M, number
+from pilotage.records.numbers import number
 from pilotage.records.patrol import PatrolRecord, read_patrol
 from pilotage.records.people import PeopleTracks, read_people_tracks
 from pilotage.records.plans import Plan, Plans, read_plans

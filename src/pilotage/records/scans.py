@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from pilotage.core.config import FARTHEST_M
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.records.arrays import Arrays, read_record, write_arrays
 from pilotage.records.events import LATEST_S
-from pilotage.records.numbers import FARTHEST_M
 
 SCANS_FILE = "scans.npz"
 LEVELS = 65534

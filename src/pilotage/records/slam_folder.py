@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
+from pilotage.core.config import FARTHEST_M
 from pilotage.core.errors import InputError
 from pilotage.core.files import read_json
 from pilotage.core.limits import DATA_BYTES
@@ -18,7 +19,6 @@ from pilotage.logs.trajectories import read_tum
 from pilotage.maps.occupancy_grid import OccupancyGrid
 from pilotage.maps.ros_map import read_ros_map
 from pilotage.records.arrays import Arrays, read_arrays
-from pilotage.records.numbers import FARTHEST_M
 from pilotage.records.reading import broken, cleaned, is_there, object_of
 from pilotage.records.slam_keyframes import KEYFRAMES_FILE, LATEST_S, Keyframes, read_keyframes, within
 

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from pilotage.core.config import FARTHEST_M
 from pilotage.core.limits import DATA_BYTES
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.records.arrays import Arrays, read_arrays, write_arrays
-from pilotage.records.numbers import FARTHEST_M
 
 KEYFRAMES_FILE = "keyframes.npz"
 LATEST_S = 1e12

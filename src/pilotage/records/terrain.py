@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pilotage.core.config import FARTHEST_M
 from pilotage.core.types import FloatArray, IntArray
 from pilotage.records.arrays import Arrays, read_record, write_arrays
-from pilotage.records.numbers import FARTHEST_M
 from pilotage.records.plans import places
 
 TERRAIN_FILE = "terrain.npz"

@@ -14,7 +14,7 @@ import numpy as np
 from pilotage.core.config import Config, validate
 from pilotage.core.errors import InputError, unknown_name
 from pilotage.core.file_kinds import check_kind
-from pilotage.core.neighbours import hint_beside
+from pilotage.core.neighbours import found_instead
 from pilotage.core.types import Pose2
 from pilotage.experiments.values import parse_yaml, read_text
 from pilotage.maps.crater_cache import cached_crater_terrain
@@ -137,8 +137,8 @@ def _named(source: str, markings: MarkingsConfig) -> WorldMap:
             raise unknown_name("map", source, shipped_maps())
         return _shipped((SHIPPED / f"{source}.yaml").read_text(), source, markings)
     if not path.is_file():
-        beside = hint_beside(path, {".yaml", ".yml", *GRID_SUFFIXES, *HEIGHTS_ALONE})
-        raise InputError(f"map '{source}': expected a map file, found none there{beside}")
+        found = found_instead(path, {".yaml", ".yml", *GRID_SUFFIXES, *HEIGHTS_ALONE})
+        raise InputError(f"map '{source}': expected a map file, found {found}")
     if suffix in HEIGHTS_ALONE:
         return _read(validate(ElevationMap, {"name": "elevation", "file": source}, "map"), markings)
     if suffix in {".yaml", ".yml"}:

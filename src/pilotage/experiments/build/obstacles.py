@@ -23,6 +23,8 @@ from pilotage.missions.world import (
 )
 
 MAX_DRAWS = 2000
+MOST_SAMPLED = 100_000_000
+"""Nodes of all draws together at which a way around is looked for: of a large map there are fewer draws."""
 ENDS_CLEAR_M = 2.5
 """An obstacle drawn by the seed keeps this far from start and goal."""
 HEAD_ON_M = 0.2
@@ -159,7 +161,9 @@ def _draw_across(
 ) -> tuple[list[FloatArray], list[FloatArray]]:
     """Boxes and pockets at the first place drawn along the path that is free and leaves a way around."""
     before = world.with_obstacles(placed.segments_m, placed.circles_m)
-    for _ in range(MAX_DRAWS):
+    draws = sampled = 0
+    while draws < MAX_DRAWS and sampled <= MOST_SAMPLED:
+        draws += 1
         index = int(rng.uniform(*obstacle.along) * (planned.shape[0] - 1))
         x, y, theta = planned[index]
         pockets: list[FloatArray] = []
@@ -187,11 +191,15 @@ def _draw_across(
             continue
         if not _free_of_walls(sides, before):
             continue
-        if goal is None or _passable(before.with_obstacles(sides, np.zeros((0, 3))), start, goal):
+        if goal is None:
             return boxes, pockets
+        field = DistanceField.from_map(before.with_obstacles(sides, np.zeros((0, 3))))
+        if _passable(field, start, goal):
+            return boxes, pockets
+        sampled += field.distance_m.size
     raise InputError(
         f"{where}: expected room for a {obstacle.kind} across the planned path with a way around it, "
-        f"found none in {MAX_DRAWS} draws; make it smaller"
+        f"found none in {draws} draws; make it smaller"
     )
 
 
@@ -255,9 +263,8 @@ def _free_of_walls(sides: FloatArray, world: SegmentMap) -> bool:
     return bool(least > 0.1)
 
 
-def _passable(world: SegmentMap, start: Pose2, goal: Goal) -> bool:
+def _passable(field: DistanceField, start: Pose2, goal: Goal) -> bool:
     """Whether start and goal are connected for a disc of radius ``PASSAGE_M``."""
-    field = DistanceField.from_map(world)
     labels, _ = scipy.ndimage.label(field.distance_m >= PASSAGE_M)
     x0, y0 = field.origin_xy_m
 

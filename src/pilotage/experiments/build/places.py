@@ -68,7 +68,7 @@ def settle_places(mission: Mission, chart: WorldMap, about: tuple[float, float] 
         kidnap if kidnap.to is not None else _carried(kidnap, chart, draws[kidnap.robot].given, rng)
         for kidnap in world.kidnaps
     )
-    if world.random_start is not None or not (mission.robots or world.start is not None):
+    if world.random_start is not None or None in map(mission.start_of, mission.members):
         mission = _with(mission, "start", starts)
     if world.random_goal is not None:
         mission = _with(mission, "goal", _goals(mission, draws, starts, streams.stream("goal")))

@@ -19,6 +19,7 @@ from pilotage.report import quantities
 from pilotage.report.event_kinds import event_kind
 from pilotage.report.figures import layers
 from pilotage.report.figures.grid import draw_grid
+from pilotage.report.figures.map_view import drawable_m
 from pilotage.report.light_axes import LightAxes
 from pilotage.report.style import (
     BLACK,
@@ -61,9 +62,10 @@ def close_ups_figure(run: RunData) -> Illustration:
     if not moments:
         return Illustration(SLUG, TITLE, "", "The run recorded no true path to look at closely.")
     radius = run.outline.radius_m or 0.3
-    least_m = 6.0 * (run.outline.half_length_m or 0.3)
+    places = path[[moment.step for moment in moments]][:, :2]
+    least_m = drawable_m(6.0 * (run.outline.half_length_m or 0.3), places)
     # Coordinates of four digits need room.
-    digits_pt = 14.0 if max(np.abs(path[moment.step]).max() for moment in moments) >= 1000.0 else 0.0
+    digits_pt = 14.0 if np.abs(places).max() >= 1000.0 else 0.0
     left_pt, right_pt, gap_pt = _LEFT_PT + digits_pt, _RIGHT_PT + 0.5 * digits_pt, _GAP_PT + digits_pt
     side = (WIDTH_PT - left_pt - right_pt - (MOST - 1) * gap_pt) / MOST
     total = side + _TOP_PT + _BOTTOM_PT

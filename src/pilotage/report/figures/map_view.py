@@ -25,6 +25,8 @@ _DIGIT_EM, _NARROW_EM, _WIDE_EM = 0.64, 0.32, 0.84
 _MOST_HEIGHT_PT, _LEAST_HEIGHT_PT = 900.0, 150.0
 # A run that needs less than this share of the floor is shown with its surroundings only.
 _SMALL_PART = 0.55
+_LEAST_MARGIN_M, _FINEST = 1e-3, 1e-6
+"""A body may be as small as one likes; axes whose ends are one number to so many parts cannot be drawn."""
 
 
 def view_limits(run: RunData) -> Limits | None:
@@ -90,8 +92,13 @@ def _extent(points: FloatArray, relative: float, least_m: float) -> Limits | Non
     if not len(points):
         return None
     (x_min, y_min), (x_max, y_max) = points.min(axis=0), points.max(axis=0)
-    margin = max(relative * max(x_max - x_min, y_max - y_min), least_m)
+    margin = max(relative * max(x_max - x_min, y_max - y_min), drawable_m(least_m, points))
     return float(x_min - margin), float(y_min - margin), float(x_max + margin), float(y_max + margin)
+
+
+def drawable_m(room_m: float, points: FloatArray) -> float:
+    """Room around points (n, 2), never so little beside their numbers that axes cannot tell them apart."""
+    return max(room_m, _LEAST_MARGIN_M, _FINEST * float(np.abs(points).max()))
 
 
 def map_axes(limits: Limits) -> tuple[Figure, Axes, float]:

@@ -13,6 +13,10 @@ _DIRECTIONS = np.array(
 )
 
 
+MOST_PLACES = 10_000
+"""Of one line: a picture is a few hundred places wide, and a line may leave one of a tiny body far behind."""
+
+
 class LabelPlacer:
     """Greedy placing by cost: what a label would cover, and how far it stands from its place.
 
@@ -75,12 +79,16 @@ class LabelPlacer:
 
 
 def along(points: FloatArray, spacing: float, price: float) -> FloatArray:
-    """Return (n, 3) places along a polyline (k, 2) at a spacing, with their price; NaN points are skipped."""
+    """Return (n, 3) places along a polyline (k, 2) at a spacing, with their price; NaN points are skipped.
+
+    Of a line that is too long for its spacing there are ``MOST_PLACES``, as much farther apart.
+    """
     points = points[np.isfinite(points).all(axis=1)]
     if not len(points):
         return np.empty((0, 3))
     steps = np.hypot(*np.diff(points, axis=0).T) if len(points) > 1 else np.zeros(0)
     travelled = np.concatenate([[0.0], np.cumsum(steps)])
+    spacing = max(spacing, travelled[-1] / (MOST_PLACES - 1))
     places = np.arange(0.0, travelled[-1] + spacing, spacing)
     xs, ys = (np.interp(places, travelled, points[:, axis]) for axis in (0, 1))
     return np.stack([xs, ys, np.full(len(places), price)], axis=1)
