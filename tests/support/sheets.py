@@ -95,7 +95,7 @@ def sheet_knowledge(**changes: Any) -> SheetKnowledge:
         cells=SHEET.cells,
         edge_is_dark=True,
         tape_width_m=TAPE_M,
-        start=START,
+        initial=Belief(START, np.zeros((3, 3))),
         body_radius_m=RADIUS_M,
         drive=WheelDriveConfig(),
         sensors=sheet_sensors(),

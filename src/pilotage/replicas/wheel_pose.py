@@ -58,7 +58,8 @@ class WheelPose:
             )
         if chosen is not None and not knowledge.magnetometer and set(chosen.USES) == {"magnetometer"}:
             raise InputError("stack.heading: this filter needs stack.navigator.magnetometer on, found it off")
-        at_start = HeadingEstimate(knowledge.start.theta_rad, START_VAR_RAD2)
+        start, told = knowledge.initial.pose, knowledge.initial.cov
+        at_start = HeadingEstimate(start.theta_rad, START_VAR_RAD2 + float(told[2, 2]))
         self._heading = chosen or EncoderGyroFilter(EncoderGyroConfig(errors=HeadingErrors()), at_start)
         uses = self._heading.USES if knowledge.fusion else frozenset()
         ((self._encoders, encoders),) = knowledge.sensors_of(WheelEncodersConfig).items()
@@ -77,11 +78,11 @@ class WheelPose:
         self._truncated, self._truncated_turn = firmware.truncated_wheel_speed, firmware.truncated_turn
         self._late_steps = max(1, round(firmware.pose_period_s / knowledge.dt_s))
         self._dt_s = knowledge.dt_s
-        self._pose, self._given = knowledge.start, knowledge.given.pose
+        self._pose, self._given = start, knowledge.given.pose
         self._bias_sum, self._bias_count = 0.0, 0
-        self._rest_steps, self._last_rad = 0, knowledge.start.theta_rad
+        self._rest_steps, self._last_rad = 0, start.theta_rad
         self._steps = 0
-        self._cov = _Covariance()
+        self._cov = _Covariance(told)
 
     @property
     def pose(self) -> Pose2:
@@ -174,7 +175,7 @@ class _Compass:
                 f"stack.magnetometer: expected one magnetometer among robot.sensors, found {len(found)}"
             )
         ((self._name, _),) = found.items()
-        self._start_rad = knowledge.start.theta_rad
+        self._start_rad = knowledge.initial.pose.theta_rad
         self._first: float | None = None
         self._measured: float | None = None
 
@@ -195,9 +196,9 @@ class _Compass:
 class _Covariance:
     """The pose's covariance entry by entry: at 100 Hz small matrices would cost more than the rest."""
 
-    def __init__(self) -> None:
-        self.xx = self.xy = self.yy = self.xt = self.yt = 0.0
-        self.tt = 1e-6
+    def __init__(self, told: FloatArray) -> None:
+        (self.xx, self.xy, self.xt), (_, self.yy, self.yt), _ = told.tolist()
+        self.tt = START_VAR_RAD2 + float(told[2, 2])
 
     def move(self, distance: float, c: float, s: float) -> None:
         """P <- F P F' + G q G' for a distance along (c, s), first order; the heading's is its filter's."""

@@ -174,6 +174,8 @@ class SheetKnowledge:
         Width and height of the sheet, and how many columns and rows its cell map has.
     edge_is_dark
         Whether its line sensors read dark beyond the edge.
+    initial
+        Where it was told that it begins.
     drive
         The data sheet of its drive, not the truth.
     fusion, avoidance, firmware, magnetometer
@@ -186,7 +188,7 @@ class SheetKnowledge:
     cells: tuple[int, int]
     edge_is_dark: bool
     tape_width_m: float
-    start: Pose2
+    initial: Belief
     body_radius_m: float
     drive: WheelDriveConfig
     sensors: Mapping[str, SensorConfig]
@@ -230,7 +232,7 @@ class SheetKnowledge:
             cells=markings.cells,
             edge_is_dark=markings.edge_is_dark,
             tape_width_m=markings.tape_width_m,
-            start=task.initial.pose,
+            initial=task.initial,
             body_radius_m=robot.radius_m,
             drive=motion,
             sensors=robot.sensors,

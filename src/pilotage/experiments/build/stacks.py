@@ -165,7 +165,8 @@ def _heading(config: StackConfig, task: TaskKnowledge) -> HeadingFilter | None:
             f"stack.heading: expected a navigator that takes a heading filter ({', '.join(takers)}), "
             f"found '{navigator}'"
         )
-    at_start = HeadingEstimate(task.initial.pose.theta_rad, START_VAR_RAD2)
+    told = task.initial
+    at_start = HeadingEstimate(told.pose.theta_rad, START_VAR_RAD2 + float(told.cov[2, 2]))
     return build_component(HEADING_FILTERS, config.heading, "heading", at_start)
 
 

@@ -67,7 +67,7 @@ class TourExplorer:
         self._goal: tuple[int, int] | None = None
         self._status, self._reason = StackStatus.RUNNING, ""
         self._left: tuple[LeftCell, ...] = ()
-        self._ahead = self._tour((knowledge.start.x_m, knowledge.start.y_m))
+        self._ahead = self._tour((knowledge.initial.pose.x_m, knowledge.initial.pose.y_m))
 
     @property
     def belief(self) -> Belief:

@@ -82,7 +82,7 @@ class Senses:
         self.edges_seen = bool(lines) and knowledge.edge_is_dark
         self.smoother = SheetSmoother(
             config.pose,
-            knowledge.start,
+            knowledge.initial,
             knowledge.drive.wheel_separation_m,
             NO_GYROSCOPE if self._gyro is None else _errors(gyroscopes[self._gyro]),
             knowledge.size_m,
@@ -95,7 +95,8 @@ class Senses:
         self._tape_width_m = knowledge.tape_width_m
         self._still = 0
         self.doubts_strays = False
-        self._dark_m, self._last_at = 0.0, (knowledge.start.x_m, knowledge.start.y_m)
+        start = knowledge.initial.pose
+        self._dark_m, self._last_at = 0.0, (start.x_m, start.y_m)
         self.floor = Rows(4)
         self.recent = RecentPoints()
 

@@ -69,8 +69,9 @@ class SheetSmoother:
 
     Parameters
     ----------
-    start
-        Pose at which the robot was put down.
+    told
+        Where the robot was told that it begins; it stands there but for ``start_position_std_m`` and
+        ``start_heading_std_rad`` besides.
     separation_m
         Of the wheels, by the data sheet.
     edges_seen
@@ -82,7 +83,7 @@ class SheetSmoother:
     def __init__(
         self,
         config: SmootherConfig,
-        start: Pose2,
+        told: Belief,
         separation_m: float,
         gyro: GyroscopeErrors,
         size_m: tuple[float, float],
@@ -94,8 +95,8 @@ class SheetSmoother:
             config = surely(config)
         self._config, self._gyro, self._separation = config, gyro, separation_m
         self._jump_gate = chi_square_quantile(JUMP_PROBABILITY, 3)
-        self._start = np.array([start.x_m, start.y_m, start.theta_rad, 0.0])
-        first = (start.x_m, start.y_m, start.theta_rad)
+        first = (told.pose.x_m, told.pose.y_m, told.pose.theta_rad)
+        self._start = np.array([*first, 0.0])
         self.keyframes = (
             Keyframes(first, separation_m, config.odometry, gyro)
             if given is None
@@ -107,16 +108,21 @@ class SheetSmoother:
         self.solved_s = 0.0
         self.solves = 0
         self._solved_beams = self._solved_crossings = 0
-        self.cov: FloatArray = np.diag(
-            np.array([config.start_position_std_m] * 2 + [config.start_heading_std_rad]) ** 2
-        )
-        self.position_std_m = config.start_position_std_m
+        put_down = np.array([config.start_position_std_m] * 2 + [config.start_heading_std_rad]) ** 2
+        self.cov: FloatArray = np.diag(put_down if given is not None else put_down + np.diag(told.cov))
+        self._start_stds, self._solved_xy_m = np.sqrt(np.diag(self.cov)), first[:2]
+        self.position_std_m = float(self._start_stds[:2].max())
 
     @property
     def belief(self) -> Belief:
-        """Pose now, with the covariance of the last solution."""
+        """Pose now; its covariance is the last solution's, whose heading has led it on since.
+
+        J P J' with the derivative of the pose now by that one; what wheels lose in between is left out.
+        """
         x, y, theta = self.keyframes.pose
-        return Belief(Pose2(x, y, wrap_to_pi(theta)), self.cov)
+        J = np.eye(3)
+        J[0, 2], J[1, 2] = self._solved_xy_m[1] - y, x - self._solved_xy_m[0]
+        return Belief(Pose2(x, y, wrap_to_pi(theta)), J @ self.cov @ J.T)
 
     @property
     def has_news(self) -> bool:
@@ -148,7 +154,7 @@ class SheetSmoother:
         self.keyframes.close()
         n, landmarks = self.keyframes.count, self.map
         poses, systematic = self.keyframes.poses[:n].copy(), self.keyframes.systematic.copy()
-        lines, cov = landmarks.saved(), self.cov
+        lines, cov = landmarks.saved(), self.belief.cov
         self._iterate(steps, merge=True)
         if not self._is_plausible(self.keyframes.poses[n - 1] - poses[n - 1], cov):
             self.keyframes.poses[:n] = poses
@@ -158,6 +164,7 @@ class SheetSmoother:
                 seen.spread[since : seen.count] *= DISTRUST
             self._iterate(1, merge=False)
         self.keyframes.corrected()
+        self._solved_xy_m = self.keyframes.pose[:2]
         self._solved_beams, self._solved_crossings = self.beams.count, self.crossings.count
         self.solved_s = self.keyframes.t_s
         self.solves += 1
@@ -217,15 +224,7 @@ class SheetSmoother:
         """Add the start, the data sheets, and the places of the sheet's edges."""
         corner, right_corner = arrow.corner, arrow.right_corner
         config, errors, gyro = self._config, self._config.odometry, self._gyro
-        start = np.array(
-            [
-                config.start_position_std_m,
-                config.start_position_std_m,
-                config.start_heading_std_rad,
-                gyro.bias_std,
-            ]
-        )
-        weights = start**-2.0
+        weights = np.array([*self._start_stds, gyro.bias_std]) ** -2.0
         arrow.diagonal[0][np.diag_indices(4)] += weights
         arrow.right[0] -= weights * (self.keyframes.poses[0] - self._start)
         turn_per_m = errors.radius_difference_std / self._separation
