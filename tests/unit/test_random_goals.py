@@ -48,6 +48,20 @@ def test_it_lies_where_the_robot_can_go_and_is_recorded() -> None:
     assert drawn[0].world.start == mission_of(reach()).world.start.model_copy(update={"theta_rad": 0.0})  # type: ignore[union-attr]
 
 
+@pytest.mark.parametrize(("door_m", "both"), [(0.8, True), (0.7, False)])
+@pytest.mark.parametrize("begin", ["start", "random_start"])
+def test_it_lies_behind_doors_that_the_body_comes_through(door_m: float, both: bool, begin: str) -> None:
+    """Places were joined by passages as wide as the room around them: in houses all lay in one room."""
+    wall = [[6, 0, 6, 5], [6, 5 + door_m, 6, 10]]
+    rooms = {"map": "two rooms", "walls_m": [*FRAME, *wall]}
+    drawn = {"start": None, "random_start": {"clearance_m": 0.6}} if begin == "random_start" else {}
+    missions = [settled(seed, map=rooms, random_goal={"clearance_m": 0.6}, **drawn) for seed in range(12)]
+    goals = [mission.world.goal for mission in missions]
+    away = [goal is not None and goal.x_m > 6.0 for goal in goals]
+    assert any(away) == both
+    assert not all(away)
+
+
 @pytest.mark.parametrize("heading", [None, 0.3])
 def test_it_is_as_near_as_the_given_one_and_has_a_heading_where_that_has(heading: float | None) -> None:
     given_goal = {"x_m": 3.0, "y_m": 3.0, "tolerance_m": 0.1, "theta_rad": heading, "tolerance_rad": 0.2}

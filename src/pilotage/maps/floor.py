@@ -37,6 +37,9 @@ HALF_DIAGONAL = math.sqrt(0.5)
 """So many spacings what is interpolated between nodes is off at most."""
 SNAP_M = 0.5
 """A place whose cell is too near to a wall stands for the nearest one that is not, this near."""
+ROUNDING_M = 1e-9
+"""Off a radius: a door as wide as asked for counts, wherever on the map it lies; drawn ones are whole cells
+wide."""
 
 
 def cell_side_m(

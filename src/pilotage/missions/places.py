@@ -34,6 +34,7 @@ class GoalConfig(MapConfig):
 class RandomPlace(Config):
     """A pose drawn from the run's seed among those that a body can drive to from ``world.start``.
 
+    It drives through passages that leave it 0.1 m on either side; the pose has ``clearance_m`` around it.
     Without a ``start`` among those of the floor that is meant: the largest that does not lie outside.
     """
 

@@ -13,7 +13,7 @@ import scipy
 from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray
 from pilotage.kernels.grids.blocked_distance import distance_to_blocked
-from pilotage.maps.floor import SNAP_M, Floor
+from pilotage.maps.floor import ROUNDING_M, SNAP_M, Floor
 from pilotage.maps.pieces import beside_edge, meant_piece
 from pilotage.maps.world_map import WorldMap
 from pilotage.missions.places import GoalConfig, PoseConfig
@@ -101,16 +101,33 @@ class OpenFloor:
         home = np.asarray(self._regions == self._home)
         inside = None if first is None else (first.x_m, first.y_m)
         try:
-            cells = Floor.of(self._chart, self.clearance_m, inside_xy_m=inside)
+            return np.asarray(
+                home & self._nodes_on(Floor.of(self._chart, self.clearance_m, inside_xy_m=inside))
+            )
         except InputError:
             return home
+
+    def joined(self, place: PoseConfig | None, radius_m: float) -> BoolArray:
+        """(rows, columns) what has its clearance and is reached from a place by passages of a radius.
+
+        Without a place, from the floor that is meant. Where nothing is, the floor itself.
+        """
+        inside, home = None if place is None else (place.x_m, place.y_m), self._regions == self._home
+        try:
+            cells = Floor.of(self._chart, radius_m - ROUNDING_M, inside_xy_m=inside, between=True)
+        except InputError:
+            return np.asarray(home)
+        return np.asarray(home | (self._regions > 0) & self._nodes_on(cells))
+
+    def _nodes_on(self, cells: Floor) -> BoolArray:
+        """(rows, columns) of the field's nodes those in a cell that is reached."""
         column, row = (
             np.clip(np.floor((nodes_m - low_m) / cells.cell_m).astype(np.int64), 0, count - 1)
             for nodes_m, low_m, count in zip(
                 self._field.axes_m, cells.origin_xy_m, cells.reachable.shape[::-1], strict=True
             )
         )
-        return np.asarray(home & cells.reachable[np.ix_(row, column)])
+        return np.asarray(cells.reachable[np.ix_(row, column)])
 
     def _region(self, x: float, y: float) -> int:
         return int(self._at_nodes(self._regions, np.array([[x, y]]))[0])
@@ -150,7 +167,9 @@ class OpenFloor:
         row, column = np.where(inside[:, None], at, 0).T
         return np.asarray(nodes[row, column] * inside)
 
-    def pose(self, rng: np.random.Generator, apart_from: Apart = ()) -> PoseConfig:
+    def pose(
+        self, rng: np.random.Generator, apart_from: Apart = (), part: BoolArray | None = None
+    ) -> PoseConfig:
         """Draw a pose, as ``draw``.
 
         Raises
@@ -158,7 +177,7 @@ class OpenFloor:
         InputError
             Where nothing is found.
         """
-        found = self.draw(rng, apart_from)
+        found = self.draw(rng, apart_from, part)
         if found is None:
             beside = " and apart from the others, as a goal is from its start" if apart_from else ""
             raise InputError(
@@ -176,7 +195,7 @@ class OpenFloor:
         """Draw a pose on a part of it, so far from each of some others; None where nothing is found."""
         xmin, ymin, xmax, ymax = self._chart.bounds_m
         low, high = [xmin, ymin, -math.pi], [xmax, ymax, math.pi]
-        wanted = self._regions == self._home if part is None else part & (self._regions == self._home)
+        wanted = self._regions == self._home if part is None else part
         for _ in range(MAX_DRAWS // DRAWS_AT_ONCE if self._home else 0):
             before = rng.bit_generator.state
             drawn = rng.uniform(low, high, (DRAWS_AT_ONCE, 3))

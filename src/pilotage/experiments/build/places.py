@@ -86,6 +86,7 @@ def random_places(mission: Mission, chart: WorldMap, obstacles: Obstacles) -> li
     """
     world = mission.world
     draws_start = world.random_start is not None and chart.markings is None
+    radii_m = _radii_m(mission)
     return [
         RandomPlaces(
             world,
@@ -93,6 +94,7 @@ def random_places(mission: Mission, chart: WorldMap, obstacles: Obstacles) -> li
             obstacles,
             mission.start_of(robot) if draws_start else start_pose(mission, index, chart),
             mission.goal_of(robot),
+            radii_m[index] + ROOM_M,
         )
         for index, robot in enumerate(mission.members)
     ]

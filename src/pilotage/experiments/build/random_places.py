@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from pilotage.core.errors import InputError
+from pilotage.core.types import BoolArray
 from pilotage.experiments.build.obstacles import Obstacles
 from pilotage.experiments.build.open_floor import Apart, OpenFloor
 from pilotage.maps.world_map import WorldMap
@@ -17,7 +18,7 @@ MAX_DRAWS = 1000
 
 
 class RandomPlaces:
-    """Draws places for one robot, again and again on the same floor.
+    """Draws places for one robot, again and again on the floor that passages ``joined_m`` from walls join.
 
     Attributes
     ----------
@@ -35,9 +36,11 @@ class RandomPlaces:
         obstacles: Obstacles,
         given: PoseConfig | None,
         goal: GoalConfig | None,
+        joined_m: float,
     ) -> None:
         self._world, self._chart, self._obstacles = world, chart, obstacles
         self.given, self.goal_like = given, goal or GoalConfig(x_m=0.0, y_m=0.0)
+        self._joined_m = joined_m
 
     def start(self, rng: np.random.Generator, apart_from: Apart = ()) -> PoseConfig:
         """A starting pose; the given one where the world draws none.
@@ -48,7 +51,7 @@ class RandomPlaces:
             Where the floor has none so far from others.
         """
         if self._world.random_start is not None:
-            return self._free(self._start_floor, rng, apart_from)
+            return self._free(*self._start_floor, rng, apart_from)
         assert self.given is not None, "what is not drawn is given"
         return self.given
 
@@ -60,24 +63,31 @@ class RandomPlaces:
         InputError
             Where the floor has none so far from others.
         """
-        drawn = self._free(self._goal_floor, rng, apart_from)
+        drawn = self._free(*self._goal_floor, rng, apart_from)
         heading = {} if self.goal_like.theta_rad is None else {"theta_rad": drawn.theta_rad}
         return self.goal_like.model_copy(update={"x_m": drawn.x_m, "y_m": drawn.y_m, **heading})
 
-    def _free(self, floor: OpenFloor, rng: np.random.Generator, apart_from: Apart) -> PoseConfig:
+    def _free(
+        self, floor: OpenFloor, part: BoolArray, rng: np.random.Generator, apart_from: Apart
+    ) -> PoseConfig:
         """A pose with room beside what stands there unexpectedly, too."""
         for _ in range(MAX_DRAWS):
-            drawn = floor.pose(rng, apart_from)
+            drawn = floor.pose(rng, apart_from, part)
             if self._obstacles.room_m(drawn.x_m, drawn.y_m) >= floor.clearance_m:
                 return drawn
         raise InputError("world.obstacles: expected room beside them for a random place, found none")
 
     @cached_property
-    def _start_floor(self) -> OpenFloor:
+    def _start_floor(self) -> tuple[OpenFloor, BoolArray]:
         assert self._world.random_start is not None, "asked only then"
-        return OpenFloor(self._chart, self._world.random_start.clearance_m, self.given)
+        return self._floor(self._world.random_start.clearance_m)
 
     @cached_property
-    def _goal_floor(self) -> OpenFloor:
+    def _goal_floor(self) -> tuple[OpenFloor, BoolArray]:
         assert self._world.random_goal is not None, "asked only then"
-        return OpenFloor(self._chart, self._world.random_goal.clearance_m, self.given)
+        return self._floor(self._world.random_goal.clearance_m)
+
+    def _floor(self, clearance_m: float) -> tuple[OpenFloor, BoolArray]:
+        """What is open, and the part of it that is drawn on."""
+        floor = OpenFloor(self._chart, clearance_m, self.given)
+        return floor, floor.joined(self.given, self._joined_m)

@@ -14,7 +14,7 @@ from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray, FloatArray, IntArray
 from pilotage.kernels.patrol.cover import greedy_cover
 from pilotage.kernels.patrol.visibility import seen_from
-from pilotage.maps.floor import Floor
+from pilotage.maps.floor import ROUNDING_M, Floor
 from pilotage.maps.known_maps import OncePerMap
 from pilotage.maps.world_map import WorldMap
 from pilotage.sensors.sensor import NonNegative, Positive
@@ -30,8 +30,6 @@ FAR_M = 8.0
 """As far as a vertex is taken to see by lasers that see farther."""
 CLOSE_M, CLOSE_EVERY_M = 1.5, 0.1
 """What is seen from none of the places to look from is looked at from so near, by places so near together."""
-ROUNDING_M = 1e-9
-"""A door as wide as asked for counts, wherever on the map it lies: drawn ones are whole cells wide."""
 
 
 class DerivationConfig(Config):
