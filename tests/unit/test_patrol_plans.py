@@ -159,6 +159,14 @@ def test_who_hears_nobody_shares_fewer_rounds() -> None:
     assert best_plan(deaf, [1.0] * 4, PlanChoice(leg_spread_m=0.0)).sizes == (4,)
 
 
+@pytest.mark.parametrize("seed", [3, 4, 7])
+def test_who_hears_nobody_does_not_stay_spread_on_a_round(seed: int) -> None:
+    """Two without a radio were taken to keep half a round apart: they drift, and drive it side by side."""
+    talking = setting_for(random_graph(seed), (0, 1))
+    assert best_plan(talking, [1.0] * 2, PlanChoice()).sizes == (2,)
+    assert best_plan(replace(talking, talks=False), [1.0] * 2, PlanChoice()).sizes == (1, 1)
+
+
 @pytest.mark.parametrize("shut", [NONE_SHUT, ShutPaths(unreached=(3,))])
 def test_plans_for_who_is_left_are_forecast_once_for_all_robots(shut: ShutPaths) -> None:
     """Each of them drove every plan on paper anew."""

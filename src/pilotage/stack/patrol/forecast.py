@@ -63,8 +63,9 @@ class Driving:
 def forecast_m(plan: Plan, graph: PatrolGraph, passages: Passages, driving: Driving) -> tuple[float, float]:
     """Worst and mean idleness times full speed, on average over a few times; the same for whoever asks.
 
-    Robots begin evenly spread on their rounds. Of passages with room for one those who come the other way
-    are kept out (``Section``), in the order in which they came; who comes the same way follows.
+    Robots begin evenly spread on their rounds; those who hear nobody are anywhere on theirs after a while. Of
+    passages with room for one those who come the other way are kept out (``Section``), in the order in which
+    they came; who comes the same way follows.
     """
     walks = _walks(plan, graph, passages, driving)
     group = np.repeat(np.arange(len(plan.rounds)), plan.sizes)
@@ -85,8 +86,10 @@ def forecast_m(plan: Plan, graph: PatrolGraph, passages: Passages, driving: Driv
     )
     # Every robot must come to the same plan: no stream of its own.
     rng = np.random.default_rng(0)
+    drifts = not driving.talks and driving.leg_spread_m > 0.0
+    places = rng.random((TIMES, len(place))) if drifts else np.tile(place, (TIMES, 1))
     driven = [
-        traffic.drive_rounds(walks, group, place * lengths, rng.random(DRAWS), manner) for _ in range(TIMES)
+        traffic.drive_rounds(walks, group, begun * lengths, rng.random(DRAWS), manner) for begun in places
     ]
     worst_m, mean_m = np.mean(driven, axis=0).tolist()
     return worst_m, mean_m
