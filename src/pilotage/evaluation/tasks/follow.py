@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 from pydantic import Field
 
-from pilotage.core.config import Config
+from pilotage.core.config import MapConfig
 from pilotage.core.errors import InputError
 from pilotage.core.types import FloatArray
 from pilotage.evaluation.driving import driving_metrics, header, poses
@@ -20,7 +20,7 @@ from pilotage.missions.places import GoalConfig, Point
 from pilotage.sensors.sensor import Positive
 
 
-class FollowConfig(Config):
+class FollowConfig(MapConfig):
     """The route's corners after the start, to be passed in this order within the tolerance."""
 
     points_m: tuple[Point, ...] = Field(min_length=1)
