@@ -87,7 +87,9 @@ def forecast_m(plan: Plan, graph: PatrolGraph, passages: Passages, driving: Driv
     # Every robot must come to the same plan: no stream of its own.
     rng = np.random.default_rng(0)
     drifts = not driving.talks and driving.leg_spread_m > 0.0
-    places = rng.random((TIMES, len(place))) if drifts else np.tile(place, (TIMES, 1))
+    is_shared = np.repeat(plan.sizes, plan.sizes) > 1
+    anywhere = np.random.default_rng(1).random((TIMES, len(place)))
+    places = np.where(drifts & is_shared, anywhere, place)
     driven = [
         traffic.drive_rounds(walks, group, begun * lengths, rng.random(DRAWS), manner) for begun in places
     ]
