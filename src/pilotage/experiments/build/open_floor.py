@@ -98,29 +98,27 @@ class OpenFloor:
 
     def in_cells(self, first: PoseConfig | None) -> BoolArray:
         """(rows, columns) of it what a task's floor, in cells, reaches from the first who was placed."""
-        home = np.asarray(self._regions == self._home)
-        inside = None if first is None else (first.x_m, first.y_m)
-        try:
-            return np.asarray(
-                home & self._nodes_on(Floor.of(self._chart, self.clearance_m, inside_xy_m=inside))
-            )
-        except InputError:
-            return home
+        home, reached = self._regions == self._home, self._reached(first, self.clearance_m)
+        return np.asarray(home if reached is None else home & reached)
 
     def joined(self, place: PoseConfig | None, radius_m: float) -> BoolArray:
         """(rows, columns) what has its clearance and is reached from a place by passages of a radius.
 
         Without a place, from the floor that is meant. Where nothing is, the floor itself.
         """
-        inside, home = None if place is None else (place.x_m, place.y_m), self._regions == self._home
-        try:
-            cells = Floor.of(self._chart, radius_m - ROUNDING_M, inside_xy_m=inside, between=True)
-        except InputError:
-            return np.asarray(home)
-        return np.asarray(home | (self._regions > 0) & self._nodes_on(cells))
+        home = self._regions == self._home
+        reached = self._reached(place, radius_m - ROUNDING_M, between=True)
+        return np.asarray(home if reached is None else home | (self._regions > 0) & reached)
 
-    def _nodes_on(self, cells: Floor) -> BoolArray:
-        """(rows, columns) of the field's nodes those in a cell that is reached."""
+    def _reached(
+        self, place: PoseConfig | None, radius_m: float, *, between: bool = False
+    ) -> BoolArray | None:
+        """(rows, columns) nodes in cells that a radius comes to (``Floor.of``); None where none is."""
+        inside = None if place is None else (place.x_m, place.y_m)
+        try:
+            cells = Floor.of(self._chart, radius_m, inside_xy_m=inside, between=between)
+        except InputError:
+            return None
         column, row = (
             np.clip(np.floor((nodes_m - low_m) / cells.cell_m).astype(np.int64), 0, count - 1)
             for nodes_m, low_m, count in zip(

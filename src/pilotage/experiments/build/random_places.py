@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cached_property
-
 import numpy as np
 
 from pilotage.core.errors import InputError
@@ -41,6 +39,7 @@ class RandomPlaces:
         self._world, self._chart, self._obstacles = world, chart, obstacles
         self.given, self.goal_like = given, goal or GoalConfig(x_m=0.0, y_m=0.0)
         self._joined_m = joined_m
+        self._floors: dict[float, tuple[OpenFloor, BoolArray]] = {}
 
     def start(self, rng: np.random.Generator, apart_from: Apart = ()) -> PoseConfig:
         """A starting pose; the given one where the world draws none.
@@ -51,7 +50,7 @@ class RandomPlaces:
             Where the floor has none so far from others.
         """
         if self._world.random_start is not None:
-            return self._free(*self._start_floor, rng, apart_from)
+            return self._free(self._world.random_start.clearance_m, rng, apart_from)
         assert self.given is not None, "what is not drawn is given"
         return self.given
 
@@ -63,31 +62,23 @@ class RandomPlaces:
         InputError
             Where the floor has none so far from others.
         """
-        drawn = self._free(*self._goal_floor, rng, apart_from)
+        assert self._world.random_goal is not None, "asked only then"
+        drawn = self._free(self._world.random_goal.clearance_m, rng, apart_from)
         heading = {} if self.goal_like.theta_rad is None else {"theta_rad": drawn.theta_rad}
         return self.goal_like.model_copy(update={"x_m": drawn.x_m, "y_m": drawn.y_m, **heading})
 
-    def _free(
-        self, floor: OpenFloor, part: BoolArray, rng: np.random.Generator, apart_from: Apart
-    ) -> PoseConfig:
+    def _free(self, clearance_m: float, rng: np.random.Generator, apart_from: Apart) -> PoseConfig:
         """A pose with room beside what stands there unexpectedly, too."""
+        floor, part = self._floor(clearance_m)
         for _ in range(MAX_DRAWS):
             drawn = floor.pose(rng, apart_from, part)
             if self._obstacles.room_m(drawn.x_m, drawn.y_m) >= floor.clearance_m:
                 return drawn
         raise InputError("world.obstacles: expected room beside them for a random place, found none")
 
-    @cached_property
-    def _start_floor(self) -> tuple[OpenFloor, BoolArray]:
-        assert self._world.random_start is not None, "asked only then"
-        return self._floor(self._world.random_start.clearance_m)
-
-    @cached_property
-    def _goal_floor(self) -> tuple[OpenFloor, BoolArray]:
-        assert self._world.random_goal is not None, "asked only then"
-        return self._floor(self._world.random_goal.clearance_m)
-
     def _floor(self, clearance_m: float) -> tuple[OpenFloor, BoolArray]:
-        """What is open, and the part of it that is drawn on."""
-        floor = OpenFloor(self._chart, clearance_m, self.given)
-        return floor, floor.joined(self.given, self._joined_m)
+        """What is open, and the part of it that is drawn on; laid once for start and goal alike."""
+        if clearance_m not in self._floors:
+            floor = OpenFloor(self._chart, clearance_m, self.given)
+            self._floors[clearance_m] = floor, floor.joined(self.given, self._joined_m)
+        return self._floors[clearance_m]
