@@ -9,6 +9,24 @@ from pilotage.kernels.control.straight_stop import speed_to_stop
 from pilotage.kernels.geometry.field import Field
 from pilotage.stack.patrol.roadmap import STEP_M, Roadmap
 
+HORIZONS_S = 0.6, 0.9
+"""Of arcs of who can stop within the first of them and while it reacts, and of whoever cannot."""
+
+
+def horizon_s(top_m_s: float, braking_m_s2: float, reacts_s: float) -> float:
+    """How long an arc of the dynamic window is, for a robot's brakes.
+
+    It is driven at one speed and turn rate. In doors of 0.8 m and in rooms hardly larger than a body's turn a
+    shorter one is of more use; weak brakes take the longer one to gain a speed that makes a difference.
+    """
+    short_s, long_s = HORIZONS_S
+    return short_s if _is_stopped(top_m_s, braking_m_s2, short_s + reacts_s) else long_s
+
+
+def _is_stopped(top_m_s: float, braking_m_s2: float, within_s: float) -> bool:
+    """Whether it stops in what it drives within that time."""
+    return top_m_s <= 2.0 * braking_m_s2 * within_s
+
 
 class Approach:
     """The speed from which it slows down in time for what its way comes to.
@@ -40,7 +58,7 @@ class Approach:
     ) -> None:
         self._top_m_s, self._braking_m_s2 = top_m_s, braking_m_s2
         self._reacts_s, self._keep_m = reacts_s, keep_m
-        self._stops_in_sight = top_m_s <= 2.0 * braking_m_s2 * (horizon_s + reacts_s)
+        self._stops_in_sight = _is_stopped(top_m_s, braking_m_s2, horizon_s + reacts_s)
         self._reach_m = 0.5 * top_m_s**2 / braking_m_s2
         self.turns_back_s = 2.0 * top_m_s / braking_m_s2
         self.slow_m_s = 0.0 if self._stops_in_sight else braking_m_s2 * horizon_s

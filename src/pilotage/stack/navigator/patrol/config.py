@@ -28,7 +28,8 @@ class WindowConfig(Config):
 
     speeds: int = Field(default=6, ge=2, le=101)
     turns: int = Field(default=15, ge=3, le=201)
-    horizon_s: Positive = 0.9
+    horizon_s: Positive | None = None
+    """None: 0.6 s, or 0.9 s for who takes longer to stop: long arcs end in the walls of small rooms."""
     heading_s_per_rad: NonNegative = 0.3
     near_cost_s: NonNegative = 0.5
     soft_m: Positive = 0.25

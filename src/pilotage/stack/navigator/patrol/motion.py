@@ -10,7 +10,7 @@ from pilotage.core.types import STOP, FloatArray, Pose2, Twist
 from pilotage.kernels.control import disc_returns, eikonal, safe_stop, voronoi_window
 from pilotage.kernels.geometry.field import Field
 from pilotage.models.motion.motion import MotionConfig
-from pilotage.stack.navigator.patrol.approach import Approach
+from pilotage.stack.navigator.patrol.approach import Approach, horizon_s
 from pilotage.stack.navigator.patrol.gate import NO_GATE, gate_at
 from pilotage.stack.navigator.patrol.hidden import HiddenMates
 from pilotage.stack.navigator.patrol.onward import Onward
@@ -35,6 +35,8 @@ THERE_RATIO = 1.0
 """Where somebody stands on the place to visit, so much of ``visit_m`` away is as good, in time to go."""
 LANE_AHEAD_M, MERGE_S = 2.0, 1.0
 """A passage is as wide as its narrowest place so far ahead; the last part of a way leads to the middle."""
+LANE_FROM_M = 6.0
+"""It keeps to its lane where a mate may be so near: the middle is shorter, and farther from walls."""
 THROUGH_RATIO = 0.5
 """It drives through a place within so much of ``visit_m``."""
 ROUND_M = 0.06
@@ -99,8 +101,9 @@ class Motion:
         window, (reacts_s, radius_m, margin_m, *_) = self._senses.config.window, self._safety.tolist()
         costs = window.heading_s_per_rad, window.near_cost_s, window.soft_m
         top_m_s, keep_m = self._senses.speed_m_s, radius_m + margin_m
-        self._approach = Approach(top_m_s, braking_m_s2, window.horizon_s, reacts_s, keep_m)
-        self._window = window.horizon_s, *costs, window.speeds, window.turns, self._approach.slow_m_s
+        ahead_s = window.horizon_s or horizon_s(top_m_s, braking_m_s2, reacts_s)
+        self._approach = Approach(top_m_s, braking_m_s2, ahead_s, reacts_s, keep_m)
+        self._window = ahead_s, *costs, window.speeds, window.turns, self._approach.slow_m_s
 
     def watch(self, *, lost: bool) -> None:
         """Look who stands, in a scan, who comes as no mate would, and where mates are that are hidden."""
@@ -187,7 +190,7 @@ class Motion:
             return self.command
         room_m = self.room_ahead_m(time)[1]
         # Where nobody can pass a lane would lead into the door's edge.
-        passable = senses.pass_m <= room_m < math.inf
+        passable = senses.pass_m <= room_m < math.inf and senses.may_meet_mates(LANE_FROM_M)
         lane_m = min(config.lane_m, max(0.0, room_m - self._clearance_m)) if passable else 0.0
         lane_m *= min(1.0, self.to_go_s / MERGE_S)
         self.blocked = self.taken = False
@@ -269,12 +272,12 @@ class Motion:
         self, at: FloatArray | None, came_from: int, then: int, discs: FloatArray
     ) -> voronoi_window.Gate:
         """The place (2,) that it passes on its way to vertex ``then``, if it is near and no sharp turn."""
-        senses, (horizon_s, turn_s_per_rad, *_) = self._senses, self._window
+        senses, (ahead_s, turn_s_per_rad, *_) = self._senses, self._window
         near_m = min(self.sure_m(), THROUGH_RATIO * senses.task.visit_m)
         if then < 0 or at is None:
             return NO_GATE
         x, y = at.tolist()
-        if math.hypot(x - senses.pose.x_m, y - senses.pose.y_m) > near_m + horizon_s * senses.speed_m_s:
+        if math.hypot(x - senses.pose.x_m, y - senses.pose.y_m) > near_m + ahead_s * senses.speed_m_s:
             return NO_GATE
 
         def around(time: FloatArray) -> Field:

@@ -274,6 +274,14 @@ class Senses:
         within_s = HEARD_PERIODS * self.config.message_period_s
         return self._last_words.whereabouts(t_s, within_s, TOLD_M, self.speed_m_s)
 
+    def may_meet_mates(self, reach_m: float) -> bool:
+        """Whether a mate may be so near: by its words; who was not heard lately may be anywhere."""
+        pose, own = self.pose, self.task.robot
+        return any(
+            number != own and not math.hypot(x - pose.x_m, y - pose.y_m) > reach_m + within_m
+            for number, (x, y, within_m, _) in enumerate(self.mates_by_their_words(self.t_s).tolist())
+        )
+
     def weaker_m_s2(self, places: FloatArray, than_m_s2: float) -> FloatArray:
         """(M,) the weakest brakes, below some, of the mates that may be seen at places (M, 2) of the map.
 
