@@ -13,7 +13,7 @@ from pilotage.core.random import RandomStreams
 from pilotage.core.types import Pose2
 from pilotage.experiments.build.obstacles import Obstacles
 from pilotage.experiments.build.open_floor import OpenFloor, random_pose, room_m
-from pilotage.experiments.build.random_places import RandomPlaces
+from pilotage.experiments.build.random_places import ROOM_M, RandomPlaces
 from pilotage.experiments.build.robots import footprint_of
 from pilotage.maps.occupancy_grid import UNKNOWN
 from pilotage.maps.world_map import WorldMap
@@ -21,9 +21,6 @@ from pilotage.missions.mission import Mission
 from pilotage.missions.places import GoalConfig, Kidnap, PoseConfig
 from pilotage.missions.robot import RobotConfig
 from pilotage.models.footprint import Footprint
-
-ROOM_M = 0.1
-"""Of a starting place that is drawn, beyond the body."""
 
 
 def start_pose(mission: Mission, index: int, chart: WorldMap) -> PoseConfig:
@@ -86,7 +83,7 @@ def random_places(mission: Mission, chart: WorldMap, obstacles: Obstacles) -> li
     """
     world = mission.world
     draws_start = world.random_start is not None and chart.markings is None
-    radii_m = _radii_m(mission)
+    bodies = _bodies(mission)
     return [
         RandomPlaces(
             world,
@@ -94,7 +91,7 @@ def random_places(mission: Mission, chart: WorldMap, obstacles: Obstacles) -> li
             obstacles,
             mission.start_of(robot) if draws_start else start_pose(mission, index, chart),
             mission.goal_of(robot),
-            radii_m[index] + ROOM_M,
+            bodies[index],
         )
         for index, robot in enumerate(mission.members)
     ]
@@ -124,9 +121,13 @@ def _goals(
     return goals
 
 
-def _radii_m(mission: Mission) -> list[float]:
+def _bodies(mission: Mission) -> list[Footprint]:
     where = "robots.{}" if mission.robots else "robot"
-    return [footprint_of(robot, where.format(index)).radius_m for index, robot in enumerate(mission.members)]
+    return [footprint_of(robot, where.format(index)) for index, robot in enumerate(mission.members)]
+
+
+def _radii_m(mission: Mission) -> list[float]:
+    return [body.radius_m for body in _bodies(mission)]
 
 
 def _with(mission: Mission, place: str, drawn: Sequence[PoseConfig | GoalConfig]) -> Mission:
