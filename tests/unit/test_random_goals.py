@@ -75,6 +75,29 @@ def test_it_lies_in_the_house_that_the_body_comes_to_not_in_its_yard() -> None:
             assert 2.0 < place.y_m < 11.0
 
 
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        (
+            {"start": None, "random_goal": None, "goal": {"x_m": 2.0, "y_m": 2.0}},
+            r"world\.random_start: \{\}",
+        ),
+        ({"random_goal": None}, r"world\.random_goal: \{\}"),
+        (
+            {"random_goal": None, "goal": {"x_m": 2.0, "y_m": 27.0}},
+            r"world\.goal: null, world\.random_goal: \{\}",
+        ),
+        ({"start": {"x_m": 6.0, "y_m": 12.0}}, r"world\.start: null"),
+    ],
+    ids=["no start", "no goal", "another map's goal", "another map's start"],
+)
+def test_who_takes_a_mission_to_another_map_is_told_that_places_can_be_drawn(
+    changes: dict[str, Any], told: str
+) -> None:
+    with pytest.raises(InputError, match=told):
+        build(mission_of(reach(world=world(**changes))))
+
+
 @pytest.mark.parametrize(("door_m", "both"), [(0.8, True), (0.7, False)])
 @pytest.mark.parametrize("begin", ["start", "random_start"])
 def test_it_lies_behind_doors_that_the_body_comes_through(door_m: float, both: bool, begin: str) -> None:

@@ -82,7 +82,7 @@ class OpenFloor:
             raise InputError(
                 f"world.start: expected random places {clearance_m:g} m from walls to be reached from "
                 f"({reachable_from.x_m:g}, {reachable_from.y_m:g}), found none; "
-                "ask for less clearance_m, or for no random places"
+                "move it, ask for less clearance_m, or on another map for none (world.start: null)"
             )
 
     @cached_property

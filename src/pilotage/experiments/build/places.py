@@ -37,7 +37,9 @@ def start_pose(mission: Mission, index: int, chart: WorldMap) -> PoseConfig:
     sheet = None if chart.markings is None else chart.markings.source
     if sheet is None:
         strategy, size = mission.team.strategy, mission.team.size
-        hint = "" if strategy is None or size is not None else "; a team's are drawn where team.size is given"
+        hint = "; give one, or have it drawn (world.random_start: {})"
+        if strategy is not None and size is None:
+            hint = "; a team's are drawn where team.size is given"
         raise InputError(f"world.start: expected a start pose, found none{hint}")
     if sheet.start_pose is None:
         return PoseConfig(x_m=0.5 * sheet.size_m[0], y_m=0.5 * sheet.size_m[1])
@@ -210,7 +212,7 @@ def check_place(where: str, x_m: float, y_m: float, footprint: Footprint, chart:
     if not chart.contains(x_m, y_m):
         raise InputError(
             f"{where}: expected a place on the map '{chart.name}' ({xmin:g} to {xmax:g}, "
-            f"{ymin:g} to {ymax:g} m), found ({x_m:g}, {y_m:g})"
+            f"{ymin:g} to {ymax:g} m), found ({x_m:g}, {y_m:g}); move it{_or_drawn(where)}"
         )
     _check_free(where, x_m, y_m, chart)
     needed = footprint.inner_radius_m
@@ -222,6 +224,14 @@ def check_place(where: str, x_m: float, y_m: float, footprint: Footprint, chart:
             f"{where}: expected at least {what} of {needed:g} m to the nearest {nearest}, "
             f"found {clear:.3f} m at ({x_m:g}, {y_m:g}); move it or make the body smaller"
         )
+
+
+def _or_drawn(where: str) -> str:
+    """The other remedy for a place that another map's mission was given."""
+    of, _, place = where.partition(".")
+    if of != "world" or place not in ("start", "goal"):
+        return ""
+    return f", or have one drawn ({where}: null, world.random_{place}: {{}})"
 
 
 def _check_free(where: str, x_m: float, y_m: float, chart: WorldMap) -> None:
