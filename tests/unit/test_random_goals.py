@@ -48,6 +48,56 @@ def test_it_lies_where_the_robot_can_go_and_is_recorded() -> None:
     assert drawn[0].world.start == mission_of(reach()).world.start.model_copy(update={"theta_rad": 0.0})  # type: ignore[union-attr]
 
 
+def test_a_body_that_reaches_far_begins_where_it_has_room_as_it_stands() -> None:
+    """It stood in walls, and the mission was refused, wherever the draw left it less than it reaches."""
+    car = {"points_m": [[1.4, 0.3], [-0.2, 0.3], [-0.2, -0.3], [1.4, -0.3]]}
+    values = reach(world=world(start=None, random_start={"clearance_m": 0.4}))
+    values["robot"]["footprint"] = car
+    for seed in range(20):
+        assert build_source(mission_of(values, seed=seed)).mission.world.start is not None
+
+
+def test_it_lies_in_the_house_that_the_body_comes_to_not_in_its_yard() -> None:
+    """Twelve rooms, each small beside the yard: the start was drawn on either, the goal on the other."""
+    x_m, y_m = (2.0, 5.0, 8.0, 11.0, 14.0), (2.0, 5.0, 8.0, 11.0)
+    walls: list[list[float]] = [[0, 0, 16, 0], [16, 0, 16, 13], [16, 13, 0, 13], [0, 13, 0, 0]]
+    walls += [[2, 2, 14, 2], [14, 2, 14, 11], [14, 11, 2, 11], [2, 11, 2, 2]]
+    for x in x_m[1:-1]:
+        walls += [part for y in y_m[:-1] for part in ([x, y, x, y + 1], [x, y + 2.1, x, y + 3])]
+    for y in y_m[1:-1]:
+        walls += [part for x in x_m[:-1] for part in ([x, y, x + 1, y], [x + 2.1, y, x + 3, y])]
+    house = {"map": "a house in a yard", "walls_m": walls}
+    for seed in range(12):
+        places = settled(seed, map=house, start=None, random_start={}, random_goal={}).world
+        for place in (places.start, places.goal):
+            assert place is not None
+            assert 2.0 < place.x_m < 14.0
+            assert 2.0 < place.y_m < 11.0
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        (
+            {"start": None, "random_goal": None, "goal": {"x_m": 2.0, "y_m": 2.0}},
+            r"world\.random_start: \{\}",
+        ),
+        ({"random_goal": None}, r"world\.random_goal: \{\}"),
+        (
+            {"random_goal": None, "goal": {"x_m": 2.0, "y_m": 27.0}},
+            r"world\.goal: null, world\.random_goal: \{\}",
+        ),
+        ({"start": {"x_m": 6.0, "y_m": 12.0}}, r"world\.start: null"),
+    ],
+    ids=["no start", "no goal", "another map's goal", "another map's start"],
+)
+def test_who_takes_a_mission_to_another_map_is_told_that_places_can_be_drawn(
+    changes: dict[str, Any], told: str
+) -> None:
+    with pytest.raises(InputError, match=told):
+        build(mission_of(reach(world=world(**changes))))
+
+
 @pytest.mark.parametrize(("door_m", "both"), [(0.8, True), (0.7, False)])
 @pytest.mark.parametrize("begin", ["start", "random_start"])
 def test_it_lies_behind_doors_that_the_body_comes_through(door_m: float, both: bool, begin: str) -> None:

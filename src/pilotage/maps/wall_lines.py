@@ -1,4 +1,4 @@
-"""The walls of a map as a line matcher wants them: merged where collinear and touching, in normal form."""
+"""The walls of a map as a line matcher wants them: merged where collinear and near, in normal form."""
 
 from __future__ import annotations
 
@@ -25,20 +25,30 @@ class WallLines:
         rad of its normal: x cos(alpha) + y sin(alpha) = rho.
     line_of
         (W,) number of the infinite line that a wall lies on; walls with a gap between them may share one.
+    pieces_m, wall_of
+        (P, 4) the map's own segments, and (P,) the wall that each is a piece of.
     """
 
     segments_m: FloatArray
     normals: FloatArray
     line_of: IntArray
+    pieces_m: FloatArray
+    wall_of: IntArray
 
     def __len__(self) -> int:
         return int(self.segments_m.shape[0])
 
     @staticmethod
     def of(
-        world: SegmentMap, offset_tolerance_m: float = 1e-3, angle_tolerance_rad: float = 1e-3
+        world: SegmentMap,
+        gap_m: float = 0.0,
+        offset_tolerance_m: float = 1e-3,
+        angle_tolerance_rad: float = 1e-3,
     ) -> WallLines:
-        """Merge the segments of a map that lie on one line and touch; pieces of no length are left out.
+        """Merge the segments of a map that lie on one line and are no farther than ``gap_m`` apart.
+
+        Pieces of no length are left out. The face of a wall in a recorded map is a row of cells with some
+        missing and some before it: a scan has one line along it, and no piece of it is as long.
 
         Tolerances apply to a wall's own normal form, so a map drawn by hand with walls a few
         millimetres askew keeps them apart. A merged wall lies where its own pieces do: walls with a gap
@@ -62,9 +72,14 @@ class WallLines:
             rho_alpha = lines[number]
             ends = sorted((_along(piece[:2], rho_alpha), _along(piece[2:], rho_alpha)))
             spans[number].append(_Span(ends[0], ends[1], [piece]))
-        segments, normals, line_of = [], [], []
+        segments: list[list[float]] = []
+        normals: list[list[float]] = []
+        line_of, wall_of = list[int](), list[int]()
+        own: list[FloatArray] = []
         for number in range(len(lines)):
-            for span in _merged(spans[number], offset_tolerance_m):
+            for span in _merged(spans[number], max(gap_m, offset_tolerance_m)):
+                own += span.pieces
+                wall_of += [len(segments)] * len(span.pieces)
                 rho, alpha = _fitted(span.pieces)
                 along = [_along(end, (rho, alpha)) for piece in span.pieces for end in (piece[:2], piece[2:])]
                 foot = rho * math.cos(alpha), rho * math.sin(alpha)
@@ -78,12 +93,14 @@ class WallLines:
             np.array(segments, dtype=np.float64).reshape(-1, 4),
             np.array(normals, dtype=np.float64).reshape(-1, 2),
             np.array(line_of, dtype=np.int64),
+            np.array(own, dtype=np.float64).reshape(-1, 4),
+            np.array(wall_of, dtype=np.int64),
         )
 
 
 @dataclass(frozen=True, slots=True)
 class _Span:
-    """Pieces that touch, and how far they reach along their line."""
+    """Pieces of one wall, and how far they reach along their line."""
 
     low: float
     high: float
@@ -123,11 +140,11 @@ def _first_line(segment: FloatArray, lines: FloatArray, offset_m: float, angle_r
     return int(found[0]) if len(found) else None
 
 
-def _merged(spans: list[_Span], touching_m: float) -> list[_Span]:
-    """Union of intervals, joined where they overlap or touch."""
+def _merged(spans: list[_Span], gap_m: float) -> list[_Span]:
+    """Union of intervals, joined where they overlap or no more than a gap is between them."""
     merged: list[_Span] = []
     for span in sorted(spans, key=lambda span: (span.low, span.high)):
-        if merged and span.low <= merged[-1].high + touching_m:
+        if merged and span.low <= merged[-1].high + gap_m:
             last = merged[-1]
             merged[-1] = _Span(last.low, max(last.high, span.high), last.pieces + span.pieces)
         else:

@@ -50,7 +50,10 @@ class ReachTask(WatchedTask):
         mission = setting.mission
         for robot in mission.members:
             if mission.goal_of(robot) is None and not config.goals:
-                raise InputError("task 'reach': expected world.goal, found none")
+                raise InputError(
+                    "task 'reach': expected world.goal, found none; give one, or have it drawn "
+                    "(world.random_goal: {})"
+                )
         if config.order == "best" and config.ends_there:
             raise InputError(
                 "task.ends_there: expected task.order 'given', found 'best', in which robots choose the last"

@@ -82,7 +82,7 @@ class OpenFloor:
             raise InputError(
                 f"world.start: expected random places {clearance_m:g} m from walls to be reached from "
                 f"({reachable_from.x_m:g}, {reachable_from.y_m:g}), found none; "
-                "ask for less clearance_m, or for no random places"
+                "move it, ask for less clearance_m, or on another map for none (world.start: null)"
             )
 
     @cached_property
@@ -104,11 +104,16 @@ class OpenFloor:
     def joined(self, place: PoseConfig | None, radius_m: float) -> BoolArray:
         """(rows, columns) what has its clearance and is reached from a place by passages of a radius.
 
-        Without a place, from the floor that is meant. Where nothing is, the floor itself.
+        Without a place, from the floor that is meant: which one that is passages of the radius say. Halls of
+        a house with that much clearance may be smaller, each, than what lies around it. Where nothing is, the
+        floor itself.
         """
         home = self._regions == self._home
         reached = self._reached(place, radius_m - ROUNDING_M, between=True)
-        return np.asarray(home if reached is None else home | (self._regions > 0) & reached)
+        if reached is None:
+            return np.asarray(home)
+        clear = (self._regions > 0) & reached
+        return np.asarray(clear if clear.any() and not (home & clear).any() else home | clear)
 
     def _reached(
         self, place: PoseConfig | None, radius_m: float, *, between: bool = False

@@ -13,7 +13,7 @@ from pilotage.core.random import RandomStreams
 from pilotage.core.types import Pose2
 from pilotage.experiments.build.obstacles import Obstacles
 from pilotage.experiments.build.open_floor import OpenFloor, random_pose, room_m
-from pilotage.experiments.build.random_places import RandomPlaces
+from pilotage.experiments.build.random_places import ROOM_M, RandomPlaces
 from pilotage.experiments.build.robots import footprint_of
 from pilotage.maps.occupancy_grid import UNKNOWN
 from pilotage.maps.world_map import WorldMap
@@ -21,9 +21,6 @@ from pilotage.missions.mission import Mission
 from pilotage.missions.places import GoalConfig, Kidnap, PoseConfig
 from pilotage.missions.robot import RobotConfig
 from pilotage.models.footprint import Footprint
-
-ROOM_M = 0.1
-"""Of a starting place that is drawn, beyond the body."""
 
 
 def start_pose(mission: Mission, index: int, chart: WorldMap) -> PoseConfig:
@@ -40,7 +37,9 @@ def start_pose(mission: Mission, index: int, chart: WorldMap) -> PoseConfig:
     sheet = None if chart.markings is None else chart.markings.source
     if sheet is None:
         strategy, size = mission.team.strategy, mission.team.size
-        hint = "" if strategy is None or size is not None else "; a team's are drawn where team.size is given"
+        hint = "; give one, or have it drawn (world.random_start: {})"
+        if strategy is not None and size is None:
+            hint = "; a team's are drawn where team.size is given"
         raise InputError(f"world.start: expected a start pose, found none{hint}")
     if sheet.start_pose is None:
         return PoseConfig(x_m=0.5 * sheet.size_m[0], y_m=0.5 * sheet.size_m[1])
@@ -86,7 +85,7 @@ def random_places(mission: Mission, chart: WorldMap, obstacles: Obstacles) -> li
     """
     world = mission.world
     draws_start = world.random_start is not None and chart.markings is None
-    radii_m = _radii_m(mission)
+    bodies = _bodies(mission)
     return [
         RandomPlaces(
             world,
@@ -94,7 +93,7 @@ def random_places(mission: Mission, chart: WorldMap, obstacles: Obstacles) -> li
             obstacles,
             mission.start_of(robot) if draws_start else start_pose(mission, index, chart),
             mission.goal_of(robot),
-            radii_m[index] + ROOM_M,
+            bodies[index],
         )
         for index, robot in enumerate(mission.members)
     ]
@@ -124,9 +123,13 @@ def _goals(
     return goals
 
 
-def _radii_m(mission: Mission) -> list[float]:
+def _bodies(mission: Mission) -> list[Footprint]:
     where = "robots.{}" if mission.robots else "robot"
-    return [footprint_of(robot, where.format(index)).radius_m for index, robot in enumerate(mission.members)]
+    return [footprint_of(robot, where.format(index)) for index, robot in enumerate(mission.members)]
+
+
+def _radii_m(mission: Mission) -> list[float]:
+    return [body.radius_m for body in _bodies(mission)]
 
 
 def _with(mission: Mission, place: str, drawn: Sequence[PoseConfig | GoalConfig]) -> Mission:
@@ -209,7 +212,7 @@ def check_place(where: str, x_m: float, y_m: float, footprint: Footprint, chart:
     if not chart.contains(x_m, y_m):
         raise InputError(
             f"{where}: expected a place on the map '{chart.name}' ({xmin:g} to {xmax:g}, "
-            f"{ymin:g} to {ymax:g} m), found ({x_m:g}, {y_m:g})"
+            f"{ymin:g} to {ymax:g} m), found ({x_m:g}, {y_m:g}); move it{_or_drawn(where)}"
         )
     _check_free(where, x_m, y_m, chart)
     needed = footprint.inner_radius_m
@@ -221,6 +224,14 @@ def check_place(where: str, x_m: float, y_m: float, footprint: Footprint, chart:
             f"{where}: expected at least {what} of {needed:g} m to the nearest {nearest}, "
             f"found {clear:.3f} m at ({x_m:g}, {y_m:g}); move it or make the body smaller"
         )
+
+
+def _or_drawn(where: str) -> str:
+    """The other remedy for a place that another map's mission was given."""
+    of, _, place = where.partition(".")
+    if of != "world" or place not in ("start", "goal"):
+        return ""
+    return f", or have one drawn ({where}: null, world.random_{place}: {{}})"
 
 
 def _check_free(where: str, x_m: float, y_m: float, chart: WorldMap) -> None:

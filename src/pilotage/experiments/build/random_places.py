@@ -8,15 +8,22 @@ from pilotage.core.errors import InputError
 from pilotage.core.types import BoolArray
 from pilotage.experiments.build.obstacles import Obstacles
 from pilotage.experiments.build.open_floor import Apart, OpenFloor
+from pilotage.kernels.bodies.outline import least_along
 from pilotage.maps.world_map import WorldMap
 from pilotage.missions.places import GoalConfig, PoseConfig
 from pilotage.missions.world import WorldConfig
+from pilotage.models.footprint import Footprint
 
 MAX_DRAWS = 1000
+ROOM_M = 0.1
+"""Of a place that is drawn, beyond the body."""
 
 
 class RandomPlaces:
-    """Draws places for one robot, again and again on the floor that passages ``joined_m`` from walls join.
+    """Draws places for one robot, again and again on the floor that its passages join.
+
+    Those have ``ROOM_M`` beside its disc. A body that reaches farther than places are asked to be from walls
+    has as much room as it stands there.
 
     Attributes
     ----------
@@ -34,11 +41,11 @@ class RandomPlaces:
         obstacles: Obstacles,
         given: PoseConfig | None,
         goal: GoalConfig | None,
-        joined_m: float,
+        body: Footprint,
     ) -> None:
         self._world, self._chart, self._obstacles = world, chart, obstacles
         self.given, self.goal_like = given, goal or GoalConfig(x_m=0.0, y_m=0.0)
-        self._joined_m = joined_m
+        self._body = body
         self._floors: dict[float, tuple[OpenFloor, BoolArray]] = {}
 
     def start(self, rng: np.random.Generator, apart_from: Apart = ()) -> PoseConfig:
@@ -72,13 +79,31 @@ class RandomPlaces:
         floor, part = self._floor(clearance_m)
         for _ in range(MAX_DRAWS):
             drawn = floor.pose(rng, apart_from, part)
-            if self._obstacles.room_m(drawn.x_m, drawn.y_m) >= floor.clearance_m:
+            if self._obstacles.room_m(drawn.x_m, drawn.y_m) >= floor.clearance_m and (
+                self._body.radius_m <= floor.clearance_m or self._stands(drawn)
+            ):
                 return drawn
+        if self._body.radius_m > floor.clearance_m:
+            raise InputError(
+                f"world: expected a random place {clearance_m:g} m from walls with room for the whole "
+                "footprint, found none; ask for more clearance_m, or take a smaller robot"
+            )
         raise InputError("world.obstacles: expected room beside them for a random place, found none")
+
+    def _stands(self, place: PoseConfig) -> bool:
+        """Whether a body that reaches far has room as it stands."""
+        walls, others = self._chart.barriers, self._obstacles
+        room_m = least_along(
+            np.array([[place.x_m, place.y_m, place.theta_rad]]),
+            self._body.outline,
+            np.concatenate([walls.segments_m, others.segments_m]),
+            np.concatenate([walls.circles_m, others.circles_m]),
+        )
+        return room_m >= ROOM_M
 
     def _floor(self, clearance_m: float) -> tuple[OpenFloor, BoolArray]:
         """What is open, and the part of it that is drawn on; laid once for start and goal alike."""
         if clearance_m not in self._floors:
             floor = OpenFloor(self._chart, clearance_m, self.given)
-            self._floors[clearance_m] = floor, floor.joined(self.given, self._joined_m)
+            self._floors[clearance_m] = floor, floor.joined(self.given, self._body.radius_m + ROOM_M)
         return self._floors[clearance_m]

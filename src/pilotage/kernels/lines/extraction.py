@@ -184,6 +184,57 @@ def _trim(points: FloatArray, run: IntArray, size: int, margin: float) -> tuple[
 
 
 @kernel
+def _away_from_breaks(
+    points: FloatArray, run: IntArray, start: int, end: int, margin: float, out: IntArray
+) -> int:
+    """Collect of ``run[start:end]`` what is no nearer than ``margin`` along it to a break in it; how many.
+
+    At a break beams between two points met something else. Where that stands on the line, as the teeth of a
+    wall of cells do, its foot passes for the line's own, and always on the same side of it.
+    """
+    first, last = run[start], run[max(end - 1, start)]
+    tx, ty = points[last, 0] - points[first, 0], points[last, 1] - points[first, 1]
+    length = math.hypot(tx, ty)
+    kept, low = 0, start
+    while low < end:
+        high = low + 1
+        while high < end and run[high] == run[high - 1] + 1:
+            high += 1
+        for k in range(low, high):
+            beside = False
+            for side in range(2):
+                if (side == 0 and low > start) or (side == 1 and high < end):
+                    i, edge = run[k], run[low] if side == 0 else run[high - 1]
+                    dx, dy = points[i, 0] - points[edge, 0], points[i, 1] - points[edge, 1]
+                    beside |= abs(dx * tx + dy * ty) < margin * length
+            if not beside:
+                out[kept] = run[k]
+                kept += 1
+        low = high
+    return kept
+
+
+@kernel
+def _own_points(
+    points: FloatArray, directions: FloatArray, index: IntArray, count: int, threshold: float
+) -> int:
+    """Keep of ``index[:count]`` what a beam's own noise lets lie off their line, first in it; how many.
+
+    A beam along a wall is off across it by next to nothing.
+    """
+    rho, alpha = fit_line(points, index, count)
+    c, s = math.cos(alpha), math.sin(alpha)
+    kept = 0
+    for k in range(count):
+        i = index[k]
+        off = points[i, 0] * c + points[i, 1] * s - rho
+        if abs(off) <= threshold * abs(directions[i, 0] * c + directions[i, 1] * s):
+            index[kept] = i
+            kept += 1
+    return kept
+
+
+@kernel
 def extract_lines(
     points: FloatArray,
     directions: FloatArray,
@@ -224,14 +275,15 @@ def extract_lines(
             if size < least_points:
                 break
             start, end = _trim(points, run, size, rules.margin)
-            kept = end - start
+            kept = _away_from_breaks(points, run, start, end, rules.threshold, near)
             if kept >= least_points:
+                kept = _own_points(points, directions, near, kept, rules.threshold)
+            if kept >= least_points and _accept(
+                points, directions, near, kept, rules, lines[found], covs[found], ends[found]
+            ):
                 for k in range(kept):
-                    near[k] = run[start + k]
-                if _accept(points, directions, near, kept, rules, lines[found], covs[found], ends[found]):
-                    for k in range(kept):
-                        members[near[k]] = found
-                    found += 1
+                    members[near[k]] = found
+                found += 1
             for k in range(size):
                 taken[run[k]] = True
             left = 0

@@ -140,7 +140,7 @@ def _verify(
             continue
         alpha = known.normals[w, 1]
         share = overlap_share(pose, cov, mount, ends[i], alpha, segments[w], rules.slack, rules.sigmas)
-        if share >= rules.least_overlap and in_sight(pose, mount, ends[i], w, segments, known.circles):
+        if share >= rules.least_overlap and in_sight(pose, mount, ends[i], w, known):
             size += 1
         else:
             held[i] = UNMATCHED

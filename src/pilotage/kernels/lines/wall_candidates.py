@@ -44,6 +44,9 @@ class Walls(NamedTuple):
     ----------
     normals, line_of, segments
         (W, 2) rho and alpha, (W,) the infinite line that a wall lies on, (W, 4) x0, y0, x1, y1.
+    pieces, wall_of
+        (P, 4) x0, y0, x1, y1 of what they are made of, without the gaps that one sees through, and (P,) the
+        wall that each is a piece of.
     circles
         (C, 3) what hides them besides.
     """
@@ -51,6 +54,8 @@ class Walls(NamedTuple):
     normals: FloatArray
     line_of: IntArray
     segments: FloatArray
+    pieces: FloatArray
+    wall_of: IntArray
     circles: FloatArray
 
 
@@ -123,14 +128,14 @@ def in_sight(
     mount: FloatArray,
     end: FloatArray,
     wall: int,
-    segments: FloatArray,
-    circles: FloatArray,
+    known: Walls,
 ) -> bool:
     """Whether any of three points of a detected line could be seen with no other wall in the way."""
     theta = pose[2] + mount[2]
     c, s = math.cos(theta), math.sin(theta)
     x = pose[0] + math.cos(pose[2]) * mount[0] - math.sin(pose[2]) * mount[1]
     y = pose[1] + math.sin(pose[2]) * mount[0] + math.cos(pose[2]) * mount[1]
+    pieces, circles = known.pieces, known.circles
     for k in range(3):
         share = 0.25 * (k + 1)
         px = (1.0 - share) * end[0] + share * end[2]
@@ -138,9 +143,9 @@ def in_sight(
         keep = max(0.0, 1.0 - SIGHT_MARGIN_M / max(math.hypot(px, py), 1e-9))
         bx, by = x + keep * (c * px - s * py), y + keep * (s * px + c * py)
         free = True
-        for i in range(segments.shape[0]):
-            if i != wall and segments_cross(
-                x, y, bx, by, segments[i, 0], segments[i, 1], segments[i, 2], segments[i, 3]
+        for i in range(pieces.shape[0]):
+            if known.wall_of[i] != wall and segments_cross(
+                x, y, bx, by, pieces[i, 0], pieces[i, 1], pieces[i, 2], pieces[i, 3]
             ):
                 free = False
                 break

@@ -81,9 +81,11 @@ class EkfWallsLocalizer:
     nothing, until the search through the map has one pose left. So it starts without a pose, too.
 
     Fails where walls run in one direction only (the pose along them is dead reckoning then), and in a map
-    that repeats itself farther than the robot sees, and in a recorded building's map made walls of: they are
-    off by centimetres, its lines by millimetres, and it says that it is lost. Where the robot stands it takes
-    in a few scans and only judges itself by the others.
+    that repeats itself farther than the robot sees. Of a grid it knows the faces of cells, as they are: where
+    walls run along rows of cells, however ragged, it is right to millimetres (0442); slanted walls are
+    staircases there, and a recording in a map of its building is off it by centimetres: it says that it is
+    lost, and ``particle-filter`` is not. Where the robot stands it takes in a few scans and only judges
+    itself by the others.
     """
 
     BY_COMMANDS: ClassVar[bool] = True
@@ -114,7 +116,9 @@ class EkfWallsLocalizer:
         self._var_scale = config.measurement_var_scale
         self._moved_m, self._alike, self._most_matched = 0.0, 0, 0
         self._mount = lidar.mount.as_array()
-        self._matcher = WallMatcher(config.matching, config.gate, chart.reflectors, self._mount)
+        self._matcher = WallMatcher(
+            config.matching, config.gate, chart.reflectors, self._mount, config.lines.gap_m
+        )
         if config.recovery is None:
             require_initial_pose(initial, "ekf-walls without recovery")
             self._recovery = None

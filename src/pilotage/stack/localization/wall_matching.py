@@ -78,17 +78,29 @@ class WallMatcher:
         matched lines of a scan together, two a line.
     mount
         (3,) pose of the scanner in the base frame.
+    gap_m
+        Over so much that is not on it a line of a scan goes on; so do walls.
     """
 
-    def __init__(self, config: WallMatchingConfig, gate: float, world: SegmentMap, mount: FloatArray) -> None:
+    def __init__(
+        self,
+        config: WallMatchingConfig,
+        gate: float,
+        world: SegmentMap,
+        mount: FloatArray,
+        gap_m: float = 0.0,
+    ) -> None:
         self.mount = mount
-        self.walls = WallLines.of(world)
+        self.walls = WallLines.of(world, gap_m)
         self.gate = chi_square_quantile(gate, LINE_DOF)
         self.joint_gates = np.array(
             [0.0, *(chi_square_quantile(gate, LINE_DOF * k) for k in range(1, MAX_LINES + 1))]
         )
         walls = self.walls
-        self._known = unnamed(Walls(walls.normals, walls.line_of, walls.segments_m, world.circles_m))
+        known = Walls(
+            walls.normals, walls.line_of, walls.segments_m, walls.pieces_m, walls.wall_of, world.circles_m
+        )
+        self._known = unnamed(known)
         rules = MatchRules(
             self.gate,
             self.joint_gates,
