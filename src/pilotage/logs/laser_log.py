@@ -258,7 +258,7 @@ def are_beams(first_angle_rad: float, angle_step_rad: float, beams: int) -> bool
     return (
         apart
         and abs(first_angle_rad) <= MOST_FIRST_RAD
-        and abs(angle_step_rad) * (beams - 1) <= MOST_VIEW_RAD
+        and abs(angle_step_rad) * max(beams - 1, 1) <= MOST_VIEW_RAD  # of one beam nobody needs it
     )
 
 
