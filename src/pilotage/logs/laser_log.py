@@ -187,7 +187,8 @@ def assemble(
         share = nothing / int(beams.sum())
         said.append(f"{nothing} ranges are not numbers ({share:.1%}): no measurement")
     first = np.array([scan.first_angle_rad for scan in with_beams])
-    told = np.array([scan.angle_step_rad for scan in with_beams])
+    # What a scan of one beam says of the next one is nothing, and may be anything.
+    told = np.where(beams == 1, LEAST_STEP_RAD, [scan.angle_step_rad for scan in with_beams])
     step = _without_the_last_post(told, beams, said)
     ranges_m = np.full((beams.size, int(beams.max())), np.nan)
     # A turned-over scanner sees its beams mirrored; a scanner of falling angles counts them clockwise.
@@ -258,7 +259,7 @@ def are_beams(first_angle_rad: float, angle_step_rad: float, beams: int) -> bool
     return (
         apart
         and abs(first_angle_rad) <= MOST_FIRST_RAD
-        and abs(angle_step_rad) * max(beams - 1, 1) <= MOST_VIEW_RAD  # of one beam nobody needs it
+        and abs(angle_step_rad) * (beams - 1) <= MOST_VIEW_RAD
     )
 
 
