@@ -10,7 +10,7 @@ from fuzz.files import faults
 from support.drawn_files import DRAWS
 
 DRAWN = 4
-BROKE = ("1-12", "1-246", "1-319", "1-1131", "1-1585", "1-3040", "1-3818")
+BROKE = ("1-12", "1-246", "1-319", "1-1131", "1-1585", "1-3040", "1-3818", "2-643")
 """Seeds of what broke something, of the kind that stands at their number among the draws."""
 
 
