@@ -43,6 +43,7 @@ def test_courses_are_read_in_order(tmp_path: Path) -> None:
         ({"cylinders": CYLINDERS.replace("2,-1.5", "4,-1.5")}, "world 4 is not in"),
         ({"cylinders": CYLINDERS.replace("0,-2.0,6.0\n", "")}, "expected 2 cylinders of world 0, found 1"),
         ({"cylinders": CYLINDERS.replace("-1.5", "x")}, "expected a number, found 'x'"),
+        ({"cylinders": CYLINDERS.replace("-1.5", "1000")}, "within 50, found 1000"),
         ({"paths": PATHS.replace("2,1,-2.0,13.0\n", "")}, "two points or more in world 2"),
         ({"worlds": WORLDS.replace("\n2,1", "\n0,1")}, "found one twice"),
         ({"worlds": WORLDS.replace("0,2,10.0,5.0", "0,2,10.0,0.0")}, "above 0"),

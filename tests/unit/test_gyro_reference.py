@@ -12,6 +12,7 @@ import pytest
 from scipy.io import savemat
 
 from pilotage.calibration.gyro_reference import calibrate_against_reference
+from pilotage.cli.main import main
 from pilotage.core.errors import InputError
 from pilotage.logs.reckoning_mat import read_reckoning_mat
 
@@ -60,6 +61,9 @@ def test_a_gap_in_the_reference_is_left_out_and_counted(tmp_path: Path) -> None:
     found = calibrate_against_reference(read_reckoning_mat(path))
     assert found.gaps_s == pytest.approx(10.0, abs=0.4)
     assert found.bias_rad_s.value == pytest.approx(BIAS, abs=1e-3)
+    # Its page was refused: "cannot be read, drift_rad: found nan; calibrate again".
+    assert main(["calibrate", "heading", str(path), "--out", str(tmp_path / "out")]) == 0
+    assert list((tmp_path / "out").glob("*/report.html"))
 
 
 @pytest.mark.parametrize(

@@ -83,6 +83,51 @@ def of_published_courses(folder: Path) -> tuple[str, ...]:
     return words
 
 
+def of_a_patrol(folder: Path) -> tuple[str, ...]:
+    written("run crowd", folder)
+    (folder / "rounds.graph").rename(folder / f"{IN_PATH}.graph")
+    mission = yaml.safe_load((folder / "mission.yaml").read_text())
+    mission["mission"] = mission["description"] = IN_TEXT
+    mission["task"]["graph"] = f"{IN_PATH}.graph"
+    mission["robots"], mission["team"]["size"] = [{"name": IN_TEXT}, {"name": IN_PATH}], 2
+    (folder / "mission.yaml").write_text(yaml.safe_dump(mission))
+    return ("run", "mission.yaml", *(word for word in QUICK if word != "--no-report"))
+
+
+def of_an_attribution(folder: Path) -> tuple[str, ...]:
+    written("run floor", folder)
+    mission = yaml.safe_load((folder / "mission.yaml").read_text())
+    mission["mission"] = mission["description"] = IN_TEXT
+    (folder / f"{IN_PATH}.yaml").write_text(yaml.safe_dump(mission))
+    short = ("--set", "run.time_limit_s=0.5", "--set", "run.dt_s=0.1", "--set", "run.settle_s=0.1")
+    return ("attribute", f"{IN_PATH}.yaml", "--trials", "2", "--workers", "1", "--quiet", *short)
+
+
+def of_a_comparison(folder: Path) -> tuple[str, ...]:
+    """Levels, groups and published values of a study, each with markup in its name."""
+    radii = {IN_TEXT: 0.3, IN_PATH: 0.5}
+    levels = {name: {"stack.planner.turning_radius_m": radius} for name, radius in radii.items()}
+    study = {
+        "study": "compared",
+        "mission": "museum-plan",
+        "trials": 2,
+        "set": {"stack.planner.iterations": 300},
+        "factors": [{"name": IN_TEXT, "levels": levels}],
+        "metrics": ["planned_length_m", "smoothness"],
+        "groups": [{"name": IN_PATH, "cells": [IN_TEXT, IN_PATH], "baseline": IN_TEXT}],
+        "published": [{"cell": IN_PATH, "metrics": {"planned_length_m": 20.0}}],
+        "reference": {"planned_length_m": {"value": 10.0, "name": IN_TEXT}},
+    }
+    (folder / "study.yaml").write_text(yaml.safe_dump(study))
+    return ("study", "study.yaml", "--workers", "1", "--quiet")
+
+
+def of_a_localization(folder: Path) -> tuple[str, ...]:
+    words = written("localize bag", folder).words
+    (folder / "a.bag").rename(folder / f"{IN_PATH}.bag")
+    return tuple(f"{IN_PATH}.bag" if word == "a.bag" else word for word in words if word != "--no-report")
+
+
 @pytest.fixture(scope="module")
 def browser(browser: Browser) -> Browser:
     """In it, scripts that run are counted."""
@@ -92,7 +137,11 @@ def browser(browser: Browser) -> Browser:
 
 
 @pytest.mark.parametrize(
-    "make", [of_a_run, of_a_study, of_a_calibration, of_a_map, of_courses, of_published_courses]
+    "make",
+    [
+        *(of_a_run, of_a_patrol, of_a_study, of_a_comparison, of_an_attribution, of_a_calibration),
+        *(of_a_map, of_a_localization, of_courses, of_published_courses),
+    ],
 )
 def test_markup_in_names_and_paths_is_text(make: object, browser: Browser, tmp_path: Path) -> None:
     assert callable(make)

@@ -106,6 +106,16 @@ def test_text_on_a_page_turns_no_direction_and_breaks_where_it_is_too_long() -> 
     assert f"<i>{'c' * 90}</i>" in made
 
 
+def test_text_in_a_figure_turns_no_direction_either() -> None:
+    """A study's factors are named by whoever wrote its file."""
+    figure = Figure(figsize=(2.0, 1.0))
+    figure.text(0.1, 0.1, "a\u202egnp\x1b[0m")
+    with style.drawing_style():
+        drawn = style.render(figure, "x", "what \u202eis\x1b there")
+    assert "a\ufffdgnp\ufffd[0m" in drawn
+    assert "what \ufffdis\ufffd there" in drawn
+
+
 def test_quantities_are_humane() -> None:
     assert quantities.length(0.00512) == "5.12\u00a0mm"
     assert quantities.length(2.6e-7) == "<0.001\u00a0mm"

@@ -17,7 +17,9 @@ from pilotage.report.figures.grid import UNKNOWN_CELL, cell_classes
 from pilotage.report.slam.page import slam_page
 from pilotage.report.slam.replay import MOST_CELLS, slam_scene
 from support.browser import Browser, find_browser
+from support.laser_bags import Drive, Scan, write_ros1
 from support.laser_rooms import along, furnished, recording, write_carmen
+from support.outcome import run
 from support.pages import check_self_contained
 
 ROUND = [(1.5, 1.2), (5.0, 1.2), (5.0, 4.0), (2.0, 4.0), (1.5, 1.2), (5.0, 1.2)]
@@ -31,6 +33,26 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert main(["slam", str(home / "lab.log"), "--out", str(home / "runs"), "--quiet"]) == 0
     (made,) = (home / "runs").iterdir()
     return made
+
+
+def test_scans_of_one_point_have_a_page(tmp_path: Path) -> None:
+    """Axes without a width drew a warning on standard error."""
+    wild = Scan(1000.2, np.array([4.0]), step_rad=1e30)  # was kept, and then the folder was none
+    scans = (*(Scan(1000.0 + 0.1 * k, np.array([4.0])) for k in range(2)), wild)
+    write_ros1(tmp_path / "a.bag", Drive(scans, ((999.95, 0.0, 0.0, 0.0), (1000.2, 0.0, 0.0, 0.0))))
+    outcome = run(["slam", "a.bag", "--out", "out", "--quiet"], tmp_path)
+    assert (outcome.code, outcome.faults()) == (0, []), outcome.err
+    assert list((tmp_path / "out").glob("*/report.html"))
+
+
+def test_a_recording_of_years_has_a_page(tmp_path: Path) -> None:
+    """Mapped more than a billion times as fast as it was made, it was to be mapped again."""
+    beams = " ".join(["2.0"] * 60)
+    lines = [f"FLASER 60 {beams} {k} 0 0 {k} 0 0 {k}e8 host {k}e8\n" for k in range(12)]
+    (tmp_path / "a.log").write_text("".join(lines))
+    outcome = run(["slam", "a.log", "--out", "out", "--quiet"], tmp_path)
+    assert (outcome.code, outcome.faults()) == (0, []), outcome.err
+    assert list((tmp_path / "out").glob("*/report.html"))
 
 
 @pytest.fixture(scope="module")

@@ -14,11 +14,13 @@ from pilotage.experiments.mission import load_mission
 from pilotage.experiments.run import run_mission
 from pilotage.experiments.studies.asked import Asked
 from pilotage.experiments.studies.engine import run_study
+from pilotage.experiments.studies.findings import study_object
 from pilotage.experiments.studies.options import StudyOptions
 from pilotage.experiments.studies.rows import flat
 from pilotage.experiments.studies.store import Store
 from pilotage.experiments.studies.study import Study
 from pilotage.experiments.studies.sweep import sweep_study
+from pilotage.experiments.studies.table import read_study
 from pilotage.experiments.studies.trial import Outcome
 from support.small_study import small
 
@@ -92,6 +94,15 @@ def test_each_setting_has_succeeded_once_and_none_gave_it(tmp_path: Path) -> Non
         asked.hear(*outcomes[2], store.path)
     sometimes.check_rows(store.path)
     store.close()
+
+
+def test_a_study_may_find_that_none_of_its_trials_succeeds(tmp_path: Path) -> None:
+    """Its path's length was asked for: it ended as a metric that no trial gives, without a page."""
+    nothing_found = {"stack.planner.iterations": 1}
+    run_study(small(set=nothing_found, factors=[], trials=2), tmp_path / "study", StudyOptions(workers=1))
+    found = study_object(read_study(tmp_path / "study"))
+    assert (found["trials"], found["failed"], found["missing"]) == (2, 0, 0)
+    assert found["cells"][0]["success"]["mean"] == 0.0
 
 
 @pytest.mark.parametrize("name", ["museum-plan", "calibrate-x"])

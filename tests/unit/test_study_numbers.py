@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from pilotage.evaluation.metric import words_and_unit
 from pilotage.experiments.studies.factors import show
+from pilotage.experiments.studies.rows import flat
 from pilotage.report.study.scales import Scale, p_value, scale_of, told
 
 
@@ -35,6 +36,12 @@ from pilotage.report.study.scales import Scale, p_value, scale_of, told
 )
 def test_a_column_has_the_unit_of_its_middle_value(metric: str, values: list[float], unit: str) -> None:
     assert scale_of(metric, values).unit == unit
+
+
+def test_numbers_beyond_anything_that_is_measured_are_none() -> None:
+    """Their sums and squares were none either, and a page of them a warning or a traceback."""
+    given = {"far": 1e308, "less": -2e30, "whole": 10**400, "success": True, "b": {"x_m": 1e30}}
+    assert flat(given) == {"success": 1.0, "b_x_m": 1e30}
 
 
 def test_digits_end_where_the_interval_begins() -> None:

@@ -31,6 +31,9 @@ SURE = 0.05
 SPREAD = 0.005
 """Contrasts are turned round where spreads differ as surely as this: by chance that costs power."""
 POWER = 0.8
+DIGITS = 12
+"""Of what is tested, as shares of the largest value: what differs by rounding alone gets no rank of its own.
+What is rounded before it is taken from one another differs by its last digit, the same way at all trials."""
 MOST_TRIALS = 1e9
 
 
@@ -134,13 +137,10 @@ def effects_of_each(
     if not metrics or metrics[0].shape[0] < FEWEST:
         return [[] for _ in metrics]
     scales = [float(np.abs(values).max()) or 1.0 for values in metrics]
-    # What averages differ by from rounding alone must not get ranks of its own.
-    rounded = [np.round(values / scale, 12) for values, scale in zip(metrics, scales, strict=True)]
+    scaled = [values / scale for values, scale in zip(metrics, scales, strict=True)]
     axes = range(metrics[0].ndim - 1)
-    asked = [[_main(values, axis, ordered[axis], paired, tests) for values in rounded] for axis in axes]
-    asked += [
-        _interactions(rounded, pair, ordered, paired, tests) for pair in itertools.combinations(axes, 2)
-    ]
+    asked = [[_main(values, axis, ordered[axis], paired, tests) for values in scaled] for axis in axes]
+    asked += [_interactions(scaled, pair, ordered, paired, tests) for pair in itertools.combinations(axes, 2)]
     judged = zip(*map(_judged, asked), strict=True)
     return [
         [_scaled(effect, scale) for effect in effects] for effects, scale in zip(judged, scales, strict=True)
@@ -158,6 +158,20 @@ def holm(p_values: Sequence[float], parts: int = 1) -> list[float]:
     out = np.full(values.shape, math.nan)
     steps = parts * values[order] * np.arange(order.size, 0, -1)
     out[order] = np.minimum(np.maximum.accumulate(steps), 1.0) if order.size else 0.0
+    return [float(value) for value in out]
+
+
+def against_picked(p_values: Sequence[float]) -> list[float]:
+    """P-values of others against one that was picked as the best of them all, as ``holm``'s.
+
+    Any two might have been picked and the other: each step counts the pairs of those that are left, for
+    what has been told apart by then cannot be among those that are as good.
+    """
+    values = np.asarray(p_values, dtype=np.float64)
+    order = np.argsort(values, kind="stable")  # nan last: it is never told apart
+    pairs = np.array([math.comb(left + 1, 2) for left in range(values.size, 0, -1)], dtype=np.float64)
+    out = np.full(values.shape, math.nan)
+    out[order] = np.minimum(np.maximum.accumulate(values[order] * pairs), 1.0)
     return [float(value) for value in out]
 
 
@@ -182,7 +196,7 @@ def _trials(power_at: Callable[[float], float]) -> float:
 
 def _main(values: FloatArray, axis: int, ordered: bool, paired: bool, tests: int) -> Effect:
     others = tuple(other + 1 for other in range(values.ndim - 1) if other != axis)
-    by_level = values.mean(axis=others) if others else values
+    by_level = np.round(values.mean(axis=others) if others else values, DIGITS)
     means = by_level.mean(axis=0)
     ends = _ends(means, ordered)
     terms = means - means.mean()
@@ -215,7 +229,7 @@ def _second_spreads(each: FloatArray, paired: bool) -> BoolArray:
     distances from the settings' own medians differ from level to level, and more surely than by the first.
     """
     apart = each - each.mean(axis=(2, 3), keepdims=True) if paired else each
-    apart = np.abs(apart - np.median(apart, axis=1, keepdims=True))
+    apart = np.round(np.abs(apart - np.median(apart, axis=1, keepdims=True)), DIGITS)
     first, second = (
         np.nan_to_num(rank_tests(levels.reshape(len(each), -1, levels.shape[-1]), paired=False), nan=1.0)
         for levels in (apart.swapaxes(2, 3), apart)
@@ -236,7 +250,7 @@ def _interaction(
     size = float((terms**2).sum()) * values.shape[0] * (values[0].size / means.size)
     along = both[:, -1] - both[:, 0]
     ends = _ends(along.mean(axis=0), ordered)
-    found = _asked(axes, np.round(contrasts, 12), means, ends, size, values, paired, tests)
+    found = _asked(axes, np.round(contrasts, DIGITS), means, ends, size, values, paired, tests)
     return replace(found, columns=(along[:, ends[0]], along[:, ends[1]]))
 
 

@@ -21,6 +21,8 @@ START = (-2.25, 3.0, np.pi / 2.0)
 GOAL_AHEAD_M = 10.0
 GOAL_TOLERANCE_M = 1.0
 TIME_LIMIT_S = 100.0
+FARTHEST_M = 50.0
+"""Of a post; the courses are 30 m long at most, and their floor is searched in fine cells."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,8 +63,9 @@ def read_barn(folder: Path) -> tuple[BarnWorld, ...]:
         raise InputError(
             f"{folder}: expected {CYLINDERS}, {PATHS} and {WORLDS}; missing: {', '.join(missing)}"
         )
-    cylinders = _read(folder / CYLINDERS, ("world", "x_m", "y_m"))
+    cylinders = _read(folder / CYLINDERS, ("world", "x_m", "y_m"), FARTHEST_M)
     paths = _read(folder / PATHS, ("world", "k", "x_m", "y_m"))
+    check_size(paths, ("world", "k", "x_m", "y_m"), 2, FARTHEST_M)
     worlds = _read(folder / WORLDS, ("world", "cylinders", "path_length_m", "optimal_time_s"))
     numbers = _numbers(worlds)
     if np.unique(numbers).size != numbers.size:
@@ -109,9 +112,9 @@ def read_published(folder: Path) -> dict[str, Table]:
     }
 
 
-def _read(path: Path, columns: tuple[str, ...]) -> Table:
+def _read(path: Path, columns: tuple[str, ...], most: float = 1e4) -> Table:
     table = read_table(path, columns, separator=",", header=True)
-    check_size(table, columns, most=1e4)
+    check_size(table, columns, most=most)
     return table
 
 

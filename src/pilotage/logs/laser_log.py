@@ -187,7 +187,8 @@ def assemble(
         share = nothing / int(beams.sum())
         said.append(f"{nothing} ranges are not numbers ({share:.1%}): no measurement")
     first = np.array([scan.first_angle_rad for scan in with_beams])
-    told = np.array([scan.angle_step_rad for scan in with_beams])
+    # What a scan of one beam says of the next one is nothing, and may be anything.
+    told = np.where(beams == 1, LEAST_STEP_RAD, [scan.angle_step_rad for scan in with_beams])
     step = _without_the_last_post(told, beams, said)
     ranges_m = np.full((beams.size, int(beams.max())), np.nan)
     # A turned-over scanner sees its beams mirrored; a scanner of falling angles counts them clockwise.

@@ -68,7 +68,7 @@ def _heading(archive: Arrays, answer: Mapping[str, Any]) -> Found:
     out = {name: archive.finite(name, -1, 3) for name in archive.names() if name.endswith(READINGS)}
     for i in range(len(answer.get("gyroscope_while_driving") or ())):
         out[f"drive-{i}/t_s"] = t_s = archive.finite(f"drive-{i}/t_s", -1, most=LATEST_S)
-        out[f"drive-{i}/drift_rad"] = archive.finite(f"drive-{i}/drift_rad", t_s.size)
+        out[f"drive-{i}/drift_rad"] = archive.floats(f"drive-{i}/drift_rad", t_s.size)  # nan in gaps
     for name, values in out.items():
         _require_some(values, name)
     return out

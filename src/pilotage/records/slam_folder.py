@@ -66,7 +66,7 @@ class SlamNumbers(BaseModel):
     map_columns: int = _COUNT
     resolution_m: float = _FINITE
     position_std_max_m: float = _FINITE
-    times_real_time: float = _FINITE
+    times_real_time: float = Field(allow_inf_nan=False)
     warnings: tuple[str, ...]
 
 

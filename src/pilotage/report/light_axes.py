@@ -24,6 +24,12 @@ class _Light(Axis):
         vars(self).setdefault("minorTicks", [])
         super().set_clip_path(path, transform)
 
+    def _get_ticks_position(self) -> Any:
+        """Asked for by a title over large numbers: it looks at the first tick of either rank."""
+        if not self.minorTicks:
+            del vars(self)["minorTicks"]  # then matplotlib makes one
+        return super()._get_ticks_position()  # type: ignore[misc]
+
 
 class _LightXAxis(_Light, XAxis):
     pass

@@ -30,6 +30,7 @@ from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import Bbox, Transform
 
 from pilotage.core.types import FloatArray
+from pilotage.records.reading import clean_text
 from pilotage.report.light_axes import LightAxes
 from pilotage.report.quantities import HOURS_FROM_S
 from pilotage.report.series import decimate
@@ -257,7 +258,8 @@ def render(figure: Figure, slug: str, alt: str) -> str:
     """Render a figure as SVG to be put into a page beside others.
 
     No prolog, no metadata, no style that would leak into the page; identifiers start with ``slug`` so that
-    those of two figures never meet; coordinates to a hundredth of a point.
+    those of two figures never meet; coordinates to a hundredth of a point. Control characters show, as in
+    ``markup.escape``.
     """
     buffer = io.StringIO()
     _let_titles_stay(figure)
@@ -275,7 +277,7 @@ def render(figure: Figure, slug: str, alt: str) -> str:
     svg = svg.replace(' id="', f' id="{slug}-').replace("url(#", f"url(#{slug}-")
     svg = svg.replace('xlink:href="#', 'href="#').replace('href="#', f'href="#{slug}-')
     svg = _ROOT.sub(rf'<svg viewBox="\1" role="img" aria-label="{_attribute(alt)}">', svg, count=1)
-    return _BETWEEN.sub("><", svg).strip()
+    return clean_text(_BETWEEN.sub("><", svg).strip())
 
 
 MOST_LAYOUTS = 2000

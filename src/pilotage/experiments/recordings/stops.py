@@ -98,7 +98,9 @@ def reckon(legs: Legs, stretches: int = STRETCHES) -> Reckoned:
         error[own], covs[own] = _along(legs, model, own)
         covs[own] *= factors[out]
         steady = (stretch != out) & (legs.kind % (len(TURNS_RAD) + 1) == 0)
-        shares[out] = float(np.abs(legs.chord_m[steady]).sum() / legs.odometer_m[steady].sum())
+        driven_m = float(legs.odometer_m[steady].sum())
+        if driven_m > 0.0:  # who turned on every leg tells nothing of detours
+            shares[out] = float(np.abs(legs.chord_m[steady]).sum()) / driven_m
     return Reckoned(error, covs, stretch, factors, shares)
 
 

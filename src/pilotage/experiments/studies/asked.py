@@ -79,7 +79,9 @@ class Asked:
             self.check_rows(database)
 
     def check_rows(self, database: Path, *, computed: bool = True) -> None:
-        """By the finished trials; what need not happen in any of them is not refused.
+        """By the trials that succeeded: one that found no path has no length, and a study may find just that.
+
+        What need not happen in any of them is not refused.
 
         Parameters
         ----------
@@ -91,6 +93,8 @@ class Asked:
             raise CorruptDatabaseError(database, trouble)
         given: set[str] = set()
         for row in rows:
+            if row["metrics"].get(SUCCESS) is False:
+                continue
             given |= flat(row["metrics"]).keys() | flat(row["timings"]).keys()
         if given:
             asked = [

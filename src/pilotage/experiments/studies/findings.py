@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from pilotage.core.types import BoolArray, FloatArray, IntArray
-from pilotage.evaluation.effects import SURE, Effect, effects_of_each, holm
+from pilotage.evaluation.effects import SURE, Effect, against_picked, effects_of_each, holm
 from pilotage.evaluation.intervals import Summary
 from pilotage.evaluation.judge import SUCCESS, Judgement
 from pilotage.evaluation.metrics import METRICS
@@ -161,6 +161,8 @@ def _effects(
         if not there[design.cells].any():
             continue
         given = design.given(there)
+        if not given.factors:  # one setting alone gives it
+            continue
         trials = values[:, given.cells]
         complete = trials[np.isfinite(trials).reshape(trials.shape[0], -1).all(axis=1)]
         alike.setdefault((given.without, len(complete)), (given, {}))[1][metric] = complete
@@ -194,9 +196,10 @@ def best_settings(table: StudyTable, judgement: Judgement) -> list[Best]:
             others = [index for index in known if index != best]
             compare = difference if table.same_seeds else difference_apart
             found = [compare(values[:, best], values[:, index]) for index in others]
-            p_values = holm([one.p_value for one in found])
+            # A mean may be better for the sake of a few trials while ranks say the contrary.
+            p_values = against_picked([one.p_value if one.effect > 0.0 else math.nan for one in found])
             also = (i for i, p in zip(others, p_values, strict=True) if not (math.isfinite(p) and p < SURE))
-            needed = least_trials(len(others), SURE, paired=table.same_seeds)
+            needed = least_trials(math.comb(len(known), 2), SURE, paired=table.same_seeds)
             enough = max(one.n for one in found) >= needed
             summary = judgement.summaries[metric][best]
             out.append(Best(metric, group.name, best, summary, tuple(also), 0 if enough else needed))

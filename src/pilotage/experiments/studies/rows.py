@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sqlite3
 from collections.abc import Iterator, Mapping
 from contextlib import closing, contextmanager, suppress
@@ -20,6 +21,7 @@ from pilotage.experiments.studies.database import (
     foreign_tables,
     has_log,
 )
+from pilotage.records.numbers import number
 
 AT_ONCE = 1024
 """Rows of a broken database that are asked for together before they are asked for one by one."""
@@ -101,13 +103,18 @@ def read_essence(path: Path) -> dict[str, Any] | None:
 
 
 def flat(metrics: Mapping[str, Any]) -> dict[str, float]:
-    """A trial's numbers by one level of names; yes and no are 1 and 0, what is no number is left out."""
+    """A trial's numbers by one level of names; yes and no are 1 and 0.
+
+    What is no number is left out, and what is larger than anything that is measured.
+    """
     out: dict[str, float] = {}
     for key, value in metrics.items():
         if isinstance(value, Mapping):
-            out |= {f"{key}_{inner}": number for inner, number in flat(value).items()}
-        elif isinstance(value, bool | int | float):
+            out |= {f"{key}_{inner}": found for inner, found in flat(value).items()}
+        elif isinstance(value, bool):
             out[key] = float(value)
+        elif math.isfinite(found := number(value)):
+            out[key] = found
     return out
 
 

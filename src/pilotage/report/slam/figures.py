@@ -105,6 +105,7 @@ def growth_figure(data: SlamFolder) -> Illustration:
     figure = Figure(figsize=(WIDTH_PT / 72.0, 0.27 * WIDTH_PT / 72.0))
     everything = _cloud(data, data.keyframe_poses, len(data.keyframes))
     low, high = everything.min(axis=0), everything.max(axis=0)
+    high = np.maximum(high, low + data.grid.resolution_m)  # of scans that saw one point, or nothing
     for stage in range(1, STAGES + 1):
         axes = figure.add_axes((0.01 + 0.247 * (stage - 1), 0.02, 0.235, 0.84))
         until = data.keyframes.since + max(1, (len(data.keyframes) - data.keyframes.since) * stage // STAGES)
