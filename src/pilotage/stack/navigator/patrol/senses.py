@@ -49,6 +49,8 @@ SWAY_M = 0.03
 AT_REST_M_S = 0.05
 HEARD_PERIODS = 4.0
 """Who said nothing for so many of its messages is silent, where no more are lost than of good radios."""
+NO_WONDER_LOG = math.log(0.05)
+"""A silence likelier than this by chance, of words that were due in reach, tells of nothing but distance."""
 MOST_LOSS = 0.95
 """Of a radio from which hardly anything arrives, as far as waiting for a word goes."""
 
@@ -275,12 +277,28 @@ class Senses:
         return self._last_words.whereabouts(t_s, within_s, TOLD_M, self.speed_m_s)
 
     def may_meet_mates(self, reach_m: float) -> bool:
-        """Whether a mate may be so near: by its words; who was not heard lately may be anywhere."""
+        """Whether a mate may be so near: by its words.
+
+        Who was not heard lately may be anywhere; not near, where radios reach much farther and it was silent
+        for long because it left their reach.
+        """
         pose, own = self.pose, self.task.robot
-        return any(
-            number != own and not math.hypot(x - pose.x_m, y - pose.y_m) > reach_m + within_m
-            for number, (x, y, within_m, _) in enumerate(self.mates_by_their_words(self.t_s).tolist())
-        )
+        closing_m = 2.0 * self.speed_m_s * (self._delay_s + self.config.message_period_s)
+        hears_it = self.talk_habit.reach_m >= reach_m + closing_m
+        for number, (x, y, within_m, _) in enumerate(self.mates_by_their_words(self.t_s).tolist()):
+            away_m = math.hypot(x - pose.x_m, y - pose.y_m)
+            is_far = away_m > reach_m + within_m or (
+                hears_it and math.isnan(away_m) and self._is_out_of_reach(number)
+            )
+            if number != own and not is_far:
+                return True
+        return False
+
+    def _is_out_of_reach(self, number: int) -> bool:
+        """Whether a mate was heard and is silent for long, which is no wonder: it may be too far away."""
+        if number not in self.mates or not self.t_s - self.mates[number][0] > self._patience_s:
+            return False
+        return bool(self.silences_log()[number] > NO_WONDER_LOG)
 
     def weaker_m_s2(self, places: FloatArray, than_m_s2: float) -> FloatArray:
         """(M,) the weakest brakes, below some, of the mates that may be seen at places (M, 2) of the map.
