@@ -14,13 +14,13 @@ import pytest
 
 import pilotage as pl
 from pilotage.bridges.export import FORMS
-from pilotage.bridges.ros.run_messages import field_names
+from pilotage.bridges.ros.run_messages import field_names, run_messages
 from pilotage.cli.main import main
 from pilotage.core.errors import InputError
 from pilotage.logs.bags import read_bag
 from pilotage.records.scans import read_sightings
-from pilotage.records.trace import Trace
-from support.fabricated_run import fabricate_run
+from pilotage.records.trace import Trace, merged, write_trace
+from support.fabricated_run import fabricate_columns, fabricate_run
 from support.missions import reach
 
 rosbags = pytest.importorskip("rosbags.highlevel", reason="needs the extra 'ros'")
@@ -147,6 +147,22 @@ def test_a_team_has_topics_for_each(tmp_path: Path, capfd: pytest.CaptureFixture
         pl.export(run, "rerun")
     gc.collect()
     assert not capfd.readouterr().err  # a name of two words and what was not written in the end drew warnings
+
+
+def test_names_that_are_no_words_of_files_and_topics_stay_apart(tmp_path: Path) -> None:
+    """Two robots were mixed on one topic; "../x" was written beside the folder, "/" into the root."""
+    names = ["一", "二", "../../up", "/", "A", "a", "robot", ".", "<b>", "一" * 300]
+    folder = fabricate_run(tmp_path / "deep" / "er" / "run")
+    write_trace(folder, merged(dict.fromkeys(names, fabricate_columns(3, np.random.default_rng(1)))))
+    made = pl.export(folder, "tum")
+    files = {path.name for path in made.iterdir()}
+    assert len(files) == len({name.casefold() for name in files}) == 2 * len(names)
+    assert {"一-truth.tum", "up-truth.tum", "A-truth.tum", "a_2-truth.tum", "robot_2-truth.tum"} < files
+    assert {path.parent for path in tmp_path.rglob("*.tum")} == {made}
+    told = run_messages(folder).stamped
+    topics = {message.topic for message in told if message.topic.endswith("/trace")}
+    assert len(topics) == len(names)
+    assert {"/n/trace", "/n_2/trace", "/a/trace", "/a_2/trace"} < topics
 
 
 def test_a_rerun_file_holds_every_entity(run: pl.Run) -> None:
