@@ -173,8 +173,22 @@ def test_a_rerun_file_holds_every_entity(run: pl.Run) -> None:
 
 
 def test_names_that_messages_cannot_have() -> None:
-    names = field_names(Trace(dict.fromkeys(("a_b", "a-b", "A..b", "2nd"), np.zeros(1)), 1))
-    assert list(names.values()) == ["a_b", "a_b_2", "a_b_3", "n_2nd"]
+    names = field_names(Trace(dict.fromkeys(("a_b", "a-b", "A..b", "2nd", "from"), np.zeros(1)), 1))
+    assert list(names.values()) == ["a_b", "a_b_2", "a_b_3", "n_2nd", "n_from"]
+
+
+def test_a_column_of_a_plugin_may_be_called_as_a_word_of_python(tmp_path: Path) -> None:
+    folder = fabricate_run(tmp_path / "run", steps=3, columns={"class": np.ones(3)})
+    assert [row.n_class for row in messages(pl.export(folder, "mcap"), "/trace")] == [1.0] * 3
+
+
+@pytest.mark.parametrize("to", ["mcap", "rosbag", "rerun"])
+def test_a_row_whose_time_no_recording_holds_is_one_line(tmp_path: Path, to: str) -> None:
+    if to == "rerun":
+        pytest.importorskip("rerun", reason="needs the extra 'rerun'")
+    folder = fabricate_run(tmp_path / "run", steps=3, columns={"t_s": 3e9 + 10.0 * np.arange(3.0)})
+    with pytest.raises(InputError, match=r"trace\.parquet: t_s: expected seconds within 2147483647"):
+        pl.export(folder, to)
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from keyword import iskeyword
 
 LONGEST = 50
 """Characters of a file's name that come from a robot's: they may take four bytes each, of 255."""
@@ -22,7 +23,8 @@ def file_words(names: Iterable[str]) -> list[str]:
 
 def _topic_word(name: str) -> str:
     word = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")
-    return word if word[:1].isalpha() else f"n_{word}".rstrip("_")
+    # Who reads messages in Python has fields as attributes.
+    return word if word[:1].isalpha() and not iskeyword(word) else f"n_{word}".rstrip("_")
 
 
 def _apart(words: Iterable[str]) -> list[str]:

@@ -60,8 +60,8 @@ def run_messages(folder: Path) -> RunMessages:
         Where it is none, or one of its files cannot be read.
     """
     first = read_run(folder)
-    require_times(first.events, folder)
     whole = read_trace(folder)
+    require_times(first.events, whole, folder)
     team = read_team(folder, first)
     began_s = float(whole.t_s[0]) if whole.steps else 0.0
     out = list(_world(first, began_s))
