@@ -14,6 +14,7 @@ import numpy as np
 from scipy.io import savemat
 
 from pilotage.logs.odometry_csv import COLUMNS
+from support.drawn_exports import exported
 from support.fuzz_targets.maps import write_walls
 from support.fuzz_targets.missions import STRAIGHT
 from support.laser_bags import Drive, Scan, write_ros1, write_ros2
@@ -405,5 +406,6 @@ DRAWS: dict[str, Draw] = {
         patrol_graph,
         barn,
         moving_ai,
+        exported,
     )
 }

@@ -14,13 +14,13 @@ import pytest
 
 import pilotage as pl
 from pilotage.bridges.export import FORMS
-from pilotage.bridges.ros.run_messages import field_names
+from pilotage.bridges.ros.run_messages import field_names, run_messages
 from pilotage.cli.main import main
 from pilotage.core.errors import InputError
 from pilotage.logs.bags import read_bag
 from pilotage.records.scans import read_sightings
-from pilotage.records.trace import Trace
-from support.fabricated_run import fabricate_run
+from pilotage.records.trace import Trace, merged, write_trace
+from support.fabricated_run import fabricate_columns, fabricate_run
 from support.missions import reach
 
 rosbags = pytest.importorskip("rosbags.highlevel", reason="needs the extra 'ros'")
@@ -149,6 +149,22 @@ def test_a_team_has_topics_for_each(tmp_path: Path, capfd: pytest.CaptureFixture
     assert not capfd.readouterr().err  # a name of two words and what was not written in the end drew warnings
 
 
+def test_names_that_are_no_words_of_files_and_topics_stay_apart(tmp_path: Path) -> None:
+    """Two robots were mixed on one topic; "../x" was written beside the folder, "/" into the root."""
+    names = ["一", "二", "../../up", "/", "A", "a", "robot", ".", "<b>", "一" * 300]
+    folder = fabricate_run(tmp_path / "deep" / "er" / "run")
+    write_trace(folder, merged(dict.fromkeys(names, fabricate_columns(3, np.random.default_rng(1)))))
+    made = pl.export(folder, "tum")
+    files = {path.name for path in made.iterdir()}
+    assert len(files) == len({name.casefold() for name in files}) == 2 * len(names)
+    assert {"一-truth.tum", "up-truth.tum", "A-truth.tum", "a_2-truth.tum", "robot_2-truth.tum"} < files
+    assert {path.parent for path in tmp_path.rglob("*.tum")} == {made}
+    told = run_messages(folder).stamped
+    topics = {message.topic for message in told if message.topic.endswith("/trace")}
+    assert len(topics) == len(names)
+    assert {"/n/trace", "/n_2/trace", "/a/trace", "/a_2/trace"} < topics
+
+
 def test_a_rerun_file_holds_every_entity(run: pl.Run) -> None:
     pytest.importorskip("rerun", reason="needs the extra 'rerun'")
     path = pl.export(run, "rerun")
@@ -157,8 +173,22 @@ def test_a_rerun_file_holds_every_entity(run: pl.Run) -> None:
 
 
 def test_names_that_messages_cannot_have() -> None:
-    names = field_names(Trace(dict.fromkeys(("a_b", "a-b", "A..b", "2nd"), np.zeros(1)), 1))
-    assert list(names.values()) == ["a_b", "a_b_2", "a_b_3", "n_2nd"]
+    names = field_names(Trace(dict.fromkeys(("a_b", "a-b", "A..b", "2nd", "from"), np.zeros(1)), 1))
+    assert list(names.values()) == ["a_b", "a_b_2", "a_b_3", "n_2nd", "n_from"]
+
+
+def test_a_column_of_a_plugin_may_be_called_as_a_word_of_python(tmp_path: Path) -> None:
+    folder = fabricate_run(tmp_path / "run", steps=3, columns={"class": np.ones(3)})
+    assert [row.n_class for row in messages(pl.export(folder, "mcap"), "/trace")] == [1.0] * 3
+
+
+@pytest.mark.parametrize("to", ["mcap", "rosbag", "rerun"])
+def test_a_row_whose_time_no_recording_holds_is_one_line(tmp_path: Path, to: str) -> None:
+    if to == "rerun":
+        pytest.importorskip("rerun", reason="needs the extra 'rerun'")
+    folder = fabricate_run(tmp_path / "run", steps=3, columns={"t_s": 3e9 + 10.0 * np.arange(3.0)})
+    with pytest.raises(InputError, match=r"trace\.parquet: t_s: expected seconds within 2147483647"):
+        pl.export(folder, to)
 
 
 @pytest.mark.parametrize(

@@ -136,10 +136,15 @@ def test_increments_survive_the_way_through_poses() -> None:
 
 
 def _scan(
-    first_rad: float, step_rad: float, ranges: list[float], range_min: float = 0.1, range_max: float = 8.0
+    first_rad: float,
+    step_rad: float,
+    ranges: list[float],
+    range_min: float = 0.1,
+    range_max: float = 8.0,
+    t_s: int = 0,
 ) -> SimpleNamespace:
-    limits = {"range_min": range_min, "range_max": range_max}
-    return SimpleNamespace(angle_min=first_rad, angle_increment=step_rad, ranges=ranges, **limits)
+    rest = {"range_min": range_min, "range_max": range_max, "header": _header(t_s)}
+    return SimpleNamespace(angle_min=first_rad, angle_increment=step_rad, ranges=ranges, **rest)
 
 
 def test_scans_of_other_beams_are_taken_by_the_nearest() -> None:
@@ -175,12 +180,15 @@ def test_what_a_driver_says_of_beams_without_a_range_is_understood() -> None:
     assert _ranges(unset, sheet).tolist() == [3.0] * 7
 
 
+def _header(t_s: int) -> SimpleNamespace:
+    return SimpleNamespace(stamp=SimpleNamespace(sec=t_s, nanosec=0))
+
+
 def _odometry(t_s: int, x_m: float, w: float = 1.0, z: float = 0.0) -> SimpleNamespace:
-    stamp = SimpleNamespace(sec=t_s, nanosec=0)
     pose = SimpleNamespace(
         position=SimpleNamespace(x=x_m, y=0.0), orientation=SimpleNamespace(x=0.0, y=0.0, z=z, w=w)
     )
-    return SimpleNamespace(header=SimpleNamespace(stamp=stamp), pose=SimpleNamespace(pose=pose))
+    return SimpleNamespace(header=_header(t_s), pose=SimpleNamespace(pose=pose))
 
 
 def test_messages_that_say_nothing_are_counted_and_not_driven_by() -> None:
@@ -197,6 +205,25 @@ def test_messages_that_say_nothing_are_counted_and_not_driven_by() -> None:
     for first_rad, step_rad in ((nan, 0.1), (0.0, nan), (0.0, 0.0), (1e30, 0.1), (0.0, 1e30)):
         hear["/scan"](_scan(first_rad, step_rad, [1.0] * 3))
     assert source.refused == {"/odom": 5, "/scan": 5}
+
+
+def test_one_scan_with_a_time_far_ahead_hides_no_later_one() -> None:
+    """The robot drove on blind for good, and nothing told of it; a scan said twice is one."""
+    hear = dict[str, Callable[[Any], None]]()
+    times = iter((0, 1, 2, 2**31 - 1, 4, 5))
+
+    def spin(_: float) -> None:
+        said.append(len(said))
+        hear["/scan"](_scan(-1.0, 1.0, [1.0, 2.0, 3.0], t_s=next(times)))
+        hear["/odom"](_odometry(said[-1], 0.1))
+
+    said: list[int] = []
+    node: Any = SimpleNamespace(spin_until=spin, listens=lambda topic, _, heard: hear.update({topic: heard}))
+    source = LiveReadings(node, ("lidar", LidarConfig(beams=3)), "odometry", 1.0)
+    steps = [source.next() for _ in range(5)]
+    assert all(step is not None and "lidar" in step.by_sensor for step in steps)
+    hear["/scan"](_scan(-1.0, 1.0, [1.0, 2.0, 3.0], t_s=5))
+    assert source.refused == {"/odom": 0, "/scan": 1}
 
 
 @pytest.mark.parametrize("step_rad", [0.0, 1e-30, 1.0])

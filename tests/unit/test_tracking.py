@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import sys
 import tempfile
 import threading
@@ -232,6 +233,8 @@ def test_a_photograph_gives_the_map_without_a_path(tmp_path: Path, capfd: pytest
         (["--grid", "0"], "--grid"),
         (["--size", "-1"], "--size"),
         (["--size", "nan"], "--size"),
+        (["--size", "1e300"], "--size"),
+        (["--corners", "1e308,0,0,1e308,-1e308,0,0,-1e308"], "eight numbers"),
         (["--hsv", "1,2,3"], "--hsv"),
         (["--hsv", "40,100,100,60,255,255"], "no robot of this colour"),
     ],
@@ -261,7 +264,19 @@ def test_a_full_disk_leaves_nothing_behind(
     assert not list(disk.iterdir())
 
 
-@pytest.mark.parametrize("kind", ["missing", "empty", "text", "noise", "blank"])
+@pytest.mark.parametrize("text", ["#EXTM3U\n#EXTINF:1,\nfilm.avi\n", "ffconcat version 1.0\nfile film.avi\n"])
+def test_a_list_of_films_is_none(
+    text: str, filmed: Filmed, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """FFmpeg opened what it names, such as a pipe, and asked a minute long for what is still to come."""
+    shutil.copy(filmed(FilmScript(frames=4)), tmp_path / "film.avi")
+    (tmp_path / "list.m3u8").write_text(text)
+    capfd.readouterr()
+    assert main(["track", str(tmp_path / "list.m3u8")]) == 2
+    assert "found a list of other files" in capfd.readouterr().err
+
+
+@pytest.mark.parametrize("kind", ["missing", "empty", "text", "noise", "blank", "thin"])
 def test_films_without_a_map_are_refused_in_one_line(
     kind: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -272,7 +287,9 @@ def test_films_without_a_map_are_refused_in_one_line(
         rng = np.random.default_rng(3)
         rough = cv2.GaussianBlur(rng.integers(0, 256, (240, 320, 3)).astype(np.uint8), (0, 0), 5.0)
         picture = cv2.normalize(rough, None, 0, 255, cv2.NORM_MINMAX) if kind == "noise" else rough * 0 + 128
-        writer = cv2.VideoWriter(str(film), cv2.VideoWriter_fourcc(*"MJPG"), 30.0, (320, 240))
+        if kind == "thin":  # reduced to half of nothing
+            picture = np.full((2, 2000, 3), 128, np.uint8)
+        writer = cv2.VideoWriter(str(film), cv2.VideoWriter_fourcc(*"MJPG"), 30.0, picture.shape[1::-1])
         for i in range(20):
             writer.write(cv2.circle(picture.copy(), (40 + 10 * i, 120), 15, (255, 0, 0), -1))
         writer.release()

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from pilotage.bridges.words import file_words
 from pilotage.core import given
 from pilotage.core.errors import InputError, unknown_name
 from pilotage.core.given import FilePath
@@ -106,7 +107,7 @@ def _rerun(run: Run, path: Path) -> None:
 
 def _tum(run: Run, folder: Path) -> None:
     with draft_folder(folder) as draft:
-        for robot, name in enumerate(run.trace.robots or ("",)):
+        for robot, name in enumerate(file_words(run.trace.robots) or ("",)):
             trace = run.trace.of(robot)
             for kind, prefix in (("estimate", "est"), ("truth", "true")):
                 names = [f"{prefix}_{part}" for part in ("x_m", "y_m", "theta_rad")]

@@ -46,7 +46,7 @@ def write_rerun(path: Path, folder: Path) -> None:
     rr = rerun()
     first, whole = read_run(folder), read_trace(folder)
     team = read_team(folder, first)
-    require_times(first.events, folder)
+    require_times(first.events, whole, folder)
     with draft_of(path) as draft:
         draft.touch()  # where nothing can be written that is told before all the work
         stream = rr.RecordingStream("pilotage", recording_id=shown(folder.name))

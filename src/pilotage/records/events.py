@@ -8,12 +8,15 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from pilotage.core.errors import InputError
 from pilotage.core.files import read_json_lines
 from pilotage.core.misfit import told
 from pilotage.core.types import Event
 from pilotage.records.numbers import number
 from pilotage.records.reading import clean_text, is_there
+from pilotage.records.trace import TRACE_FILE, Trace
 
 EVENTS_FILE = "events.jsonl"
 MOST_EVENTS = 20_000
@@ -58,19 +61,23 @@ def _event(entry: Mapping[str, Any], path: Path) -> Event:
     return Event(t_s, kind, text)
 
 
-def require_times(events: Iterable[Event], folder: Path) -> None:
-    """Refuse events without a time that a recording can hold, which a page shows.
+def require_times(events: Iterable[Event], trace: Trace, folder: Path) -> None:
+    """Refuse events and rows without a time that a recording can hold, which a page shows.
 
     Raises
     ------
     InputError
-        Where an event's time is not finite, before the begin or beyond 32 bits of seconds.
+        Where an event's time is not finite, or before the begin, or any is beyond 32 bits of seconds.
     """
     if not all(0.0 <= event.t_s <= LATEST_S for event in events):
         raise InputError(
             f"{folder / EVENTS_FILE}: expected the time of every event in seconds, 0 to {LATEST_S}, "
             "found one without"
         )
+    if (
+        np.abs(trace["t_s"]) > LATEST_S
+    ).any():  # of a robot with one row its own time is told, whatever it is
+        raise InputError(f"{folder / TRACE_FILE}: t_s: expected seconds within {LATEST_S}, found more")
 
 
 def _word(entry: Mapping[str, Any], name: str, path: Path) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pilotage.core.errors import InputError
-from pilotage.core.files import require_file
+from pilotage.core.files import opened
 from pilotage.core.hushed import hushed
 from pilotage.tracking.opencv import opencv
 
@@ -26,6 +26,8 @@ WORKING_SIDE_PX = 960
 
 _MOST_SAMPLES = 32
 _TOLERATED_MISSING = 0.01
+_LISTS = (b"#EXTM3U", b"ffconcat")
+"""FFmpeg would open whatever stands in them, a pipe too, and wait for what a live one is still to get."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +87,7 @@ def survey(path: Path, advance: Advance | None = None) -> FilmSummary:
                 if not good:
                     break
                 shape = image.shape[:2]
-                reduction = max(1, math.ceil(max(shape) / WORKING_SIDE_PX))
+                reduction = min(max(1, math.ceil(max(shape) / WORKING_SIDE_PX)), *shape)
                 kept.append(reduced(image, reduction))
                 if len(kept) > _MOST_SAMPLES:
                     kept, every = kept[::2], every * 2
@@ -122,7 +124,9 @@ def reduced(image: Image, by: int) -> Image:
 @contextmanager
 def _opened(path: Path) -> Iterator[Any]:
     cv2 = opencv()
-    require_file(path, "a video file")
+    with opened(path, "a video file") as file:
+        if file.read(8).startswith(_LISTS):
+            raise InputError(f"{path}: expected a video, found a list of other files; give one of them")
     with hushed():
         capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
     try:

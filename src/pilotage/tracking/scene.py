@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,6 +25,8 @@ Floats = NDArray[np.float64]
 _GIVEN_CORNER_STD_PX = 1.0
 """A corner that a person points at is good to about a pixel."""
 _TOP_VIEW_PX = 900
+SMALLEST_M, LARGEST_M = 1e-3, 1e6
+"""Sides of maps."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,8 +59,10 @@ class TrackOptions:
     def __post_init__(self) -> None:
         if not 1 <= self.grid <= 1000:
             raise InputError(f"--grid: expected 1 to 1000 cells a side, found {self.grid}")
-        if not (math.isfinite(self.size_m) and self.size_m > 0.0):
-            raise InputError(f"--size: expected a length in metres > 0, found {self.size_m}")
+        if not SMALLEST_M <= self.size_m <= LARGEST_M:
+            raise InputError(
+                f"--size: expected metres from {SMALLEST_M:g} to {LARGEST_M:g}, found {self.size_m}"
+            )
         if self.radius_m is not None and not 0.0 < self.radius_m < 0.5 * self.size_m:
             raise InputError(f"--radius: expected metres between 0 and half the map, found {self.radius_m}")
         if not 0.0 <= self.height_m < self.size_m:

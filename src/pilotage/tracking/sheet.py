@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -13,6 +12,8 @@ from pilotage.core.errors import InputError
 from pilotage.tracking.opencv import opencv
 
 Floats = NDArray[np.float64]
+MOST_PX = 1e6
+"""Farther than any picture is wide."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +121,7 @@ def parse_corners(text: str) -> Floats:
         values = [float(part) for part in text.split(",")]
     except ValueError:
         values = []
-    if len(values) != 8 or not all(math.isfinite(value) for value in values):
+    if len(values) != 8 or not all(abs(value) <= MOST_PX for value in values):
         raise InputError(f"--corners: expected eight numbers x,y,x,y,x,y,x,y in pixels, found '{text}'")
     corners = np.array(values).reshape(4, 2)
     turns = turning(corners)

@@ -39,7 +39,7 @@ class LiveReadings:
     ----------
     refused
         Messages by topic that say nothing: a pose that is none, or not later than the last; beams that no
-        scanner has. A robot that drove by them would be nowhere for good.
+        scanner has, or of the same time as the last. A robot that drove by them would be nowhere for good.
     """
 
     def __init__(self, node: Any, lidar: tuple[str, LidarConfig] | None, odometry: str, dt_s: float) -> None:
@@ -47,7 +47,7 @@ class LiveReadings:
         self._pose: tuple[float, Pose2] | None = None
         self._scan: tuple[float, Any] | None = None
         self._used: tuple[float, Pose2] | None = None
-        self._used_scan_s = self._began_s = -math.inf
+        self._heard_scan_s = self._began_s = -math.inf
         self._patience_s = time.perf_counter() + FIRST_S
         self.refused = {"/odom": 0} | ({} if lidar is None else {"/scan": 0})
         node.listens("/odom", ros.ODOMETRY, self._hear_odometry)
@@ -65,8 +65,9 @@ class LiveReadings:
         self._patience_s = time.perf_counter() + SILENT_S
 
     def _hear_scan(self, message: Any) -> None:
-        if are_beams(message.angle_min, message.angle_increment, len(message.ranges)):
-            self._scan = _seconds(message), message
+        t_s, beams = _seconds(message), (message.angle_min, message.angle_increment, len(message.ranges))
+        if t_s != self._heard_scan_s and are_beams(*beams):
+            self._scan, self._heard_scan_s = (t_s, message), t_s
         else:
             self.refused["/scan"] += 1
 
@@ -89,10 +90,12 @@ class LiveReadings:
 
     def _take(self, before: tuple[float, Pose2], now: tuple[float, Pose2]) -> Readings:
         said: dict[str, Reading] = {self._odometry: _increment(before[1], now[1])}
-        if self._lidar is not None and self._scan is not None and self._scan[0] > self._used_scan_s:
-            self._used_scan_s = self._scan[0]
+        if self._lidar is not None and self._scan is not None:
             name, sheet = self._lidar
             said[name] = LidarScan(_ranges(self._scan[1], sheet))
+            self._scan = (
+                None  # used once, whatever its clock says: one time far ahead is no later one's fault
+            )
         self._used = now
         return Readings(now[0] - self._began_s, said)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from pilotage.bridges.ros import messages as ros
+from pilotage.bridges.words import topic_words
 from pilotage.core.types import FloatArray, Pose2
 from pilotage.maps.occupancy_grid import OccupancyGrid
 from pilotage.maps.rasterize import rasterized
@@ -60,14 +60,15 @@ def run_messages(folder: Path) -> RunMessages:
         Where it is none, or one of its files cannot be read.
     """
     first = read_run(folder)
-    require_times(first.events, folder)
     whole = read_trace(folder)
+    require_times(first.events, whole, folder)
     team = read_team(folder, first)
     began_s = float(whole.t_s[0]) if whole.steps else 0.0
     out = list(_world(first, began_s))
     fields = field_names(whole)
-    for robot, data in enumerate(team):
-        name = f"/{_word(data.robots[robot])}" if len(team) > 1 else ""
+    # Two robots on one topic could not be told apart.
+    names = [f"/{word}" for word in topic_words(first.robots)] if len(team) > 1 else [""]
+    for robot, (name, data) in enumerate(zip(names, team, strict=True)):
         out += _robot(data, name, began_s)
         out += _rows(whole.of(robot), name, fields)
     if first.events:
@@ -86,20 +87,8 @@ def run_messages(folder: Path) -> RunMessages:
 
 
 def field_names(trace: Trace) -> dict[str, str]:
-    """The trace's columns by what a message may call them: small letters, digits and single underscores."""
-    names: dict[str, str] = {}
-    for column in trace.columns:
-        base = word = _word(column)
-        number = 2
-        while word in names.values():
-            word, number = f"{base}_{number}", number + 1
-        names[column] = word
-    return names
-
-
-def _word(name: str) -> str:
-    word = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")
-    return word if word[:1].isalpha() else f"n_{word}".rstrip("_")
+    """The trace's columns by what a message may call them."""
+    return dict(zip(trace.columns, topic_words(trace.columns), strict=True))
 
 
 def _rows(trace: Trace, name: str, fields: dict[str, str]) -> Iterator[Stamped]:
