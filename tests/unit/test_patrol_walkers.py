@@ -47,12 +47,21 @@ def test_who_walks_on_is_told_by_the_front_that_comes_nearer() -> None:
     assert not comes_on(2.9, np.array([[3.16, 0.0]])), "may yet stop"
 
 
-@pytest.mark.parametrize("corners", [False, True])
-def test_walkers_are_run_into_by_nobody_who_hears_no_mates(corners: bool, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("corners", "seeds"),
+    [
+        (False, (3, 4, 5, 6)),
+        (True, (4, 5, 6)),
+        pytest.param(True, (3,), marks=pytest.mark.xfail(reason="touched at 0.08 m/s", strict=False)),
+    ],
+)
+def test_walkers_are_run_into_by_nobody_who_hears_no_mates(
+    corners: bool, seeds: tuple[int, ...], tmp_path: Path
+) -> None:
     """Every two seconds somebody walks straight through a hall, and gives way to nobody.
 
     In five of 24 runs he touches a robot that rolls at about 0.1 m/s yet, as he comes around an edge or along
-    its side, with longer arcs too: these seeds are of the others.
+    its side, in four with longer arcs: most of these seeds are of the others.
     """
     rows = []
     for person in range(40):
@@ -72,7 +81,7 @@ def test_walkers_are_run_into_by_nobody_who_hears_no_mates(corners: bool, tmp_pa
     ]
     if corners:
         changes.append("robot.footprint={points_m: [[0.3, 0.2], [-0.3, 0.2], [-0.3, -0.2], [0.3, -0.2]]}")
-    for seed in (4, 5, 6):
+    for seed in seeds:
         robots = simulate(load_mission("museum-patrol", changes, seed)).finished.robots
         assert sum(robot.collisions for robot in robots) == 0
         assert sum(robot.encounters.touches for robot in robots if robot.encounters is not None) > 0, (

@@ -74,9 +74,8 @@ def require_times(events: Iterable[Event], trace: Trace, folder: Path) -> None:
             f"{folder / EVENTS_FILE}: expected the time of every event in seconds, 0 to {LATEST_S}, "
             "found one without"
         )
-    if (
-        np.abs(trace["t_s"]) > LATEST_S
-    ).any():  # of a robot with one row its own time is told, whatever it is
+    # Of a robot with one row its own time is told, whatever it is.
+    if (np.abs(trace["t_s"]) > LATEST_S).any():
         raise InputError(f"{folder / TRACE_FILE}: t_s: expected seconds within {LATEST_S}, found more")
 
 

@@ -93,9 +93,8 @@ class LiveReadings:
         if self._lidar is not None and self._scan is not None:
             name, sheet = self._lidar
             said[name] = LidarScan(_ranges(self._scan[1], sheet))
-            self._scan = (
-                None  # used once, whatever its clock says: one time far ahead is no later one's fault
-            )
+            # Each is used once, whatever its clock says: one far ahead is no fault of those that follow.
+            self._scan = None
         self._used = now
         return Readings(now[0] - self._began_s, said)
 
